@@ -408,9 +408,10 @@ def test_the_command_plans(tmp_path, capsys):
         (["FEW", "-o", "x.csv"], "expected a file name that ends in .yaml"),
         (["FEW", "--measure", "Z"], "--measure: goes with --plan"),
         (["--plan", "3"], "numbers for 18 unknown ones"),
-        (["--plan", "0"], "count: a number from 1 to 400 expected"),
-        (["--plan", "10", "--measure", "Q"], "axes: unknown Q"),
-        (["--plan", "10", "--measure", "X X"], "axes: X X, each once expected"),
+        (["--plan", "0"], "--plan: a number from 1 to 400 expected"),
+        (["--plan", "10", "--measure", "Q"], "--measure: unknown Q"),
+        (["--plan", "10", "--measure", "X X"], "--measure: X X, each once expected"),
+        (["--plan", "10", "--noise", "1e308um"], "--noise: noise length: a number from 1e-09 to"),
         (["--plan", "40", "--measure", "Z"], "can't tell"),
     ],
 )

@@ -73,7 +73,7 @@ def test_a_table_that_is_too_wide_is_turned(monkeypatch):
         (["orthoglide", "no_such"], "no_such"),
         ([*NAMES, "--struts", "9N/um"], "struts: the drives' stiffness is missing"),
         ([*NAMES, "--drives", "9"], 'drives: tower_a: "9"'),
-        ([*NAMES, "--tolerance", "foot=1mm,encoders=2um"], "tolerance foot: none of the machines has such a number"),
+        ([*NAMES, "--tolerance", "foot=1mm,encoders=2um"], "--tolerance foot: none of the machines has such a number"),
         ([*NAMES, "--tolerance", "feet"], "expected NAME=VALUE"),
         ([*NAMES, "--samples", "0"], "samples"),
         ([*NAMES, "--part", "none.apt"], "none.apt"),

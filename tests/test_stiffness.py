@@ -267,7 +267,7 @@ def test_along_a_posted_path(tmp_path, capsys, monkeypatch):
             ["--drives", "100N/um"],
             'drives: theta1: "100N/um" is a stiffness, expected an angular stiffness (Nm/rad, kNm/rad)',
         ),
-        ("tricept", ["--drives", "d*=100N/um"], "drives: theta1 has no stiffness; rigid is one"),
+        ("tricept", ["--drives", "d*=100N/um"], "--drives: theta1 has no stiffness; rigid is one"),
         ("tricept", ["--drives", "*=rigid,q=1N/um"], 'drives: unknown "q"'),
         ("orthoglide", ["--drives", "100"], '"100" needs a unit: N/um, kN/mm, N/mm'),
         ("orthoglide", ["--drives", "1e300N/um"], '"1e300N/um" is out of range'),
@@ -278,7 +278,7 @@ def test_along_a_posted_path(tmp_path, capsys, monkeypatch):
         (
             "orthoglide",
             ["--drives", "1N/um", "--drives", "2N/um"],
-            "drives: 1N/um and 2N/um for all, expected them by names",
+            "--drives: 1N/um and 2N/um for all, expected them by names",
         ),
         ("orthoglide", ["--drives", "rho_x=1N/um,rho_x=2N/um"], "rho_x is given twice"),
         ("orthoglide", ["--drives", "1N/um", "--struts", "wall=2mm"], "struts: the diameter is missing"),
@@ -294,8 +294,8 @@ def test_along_a_posted_path(tmp_path, capsys, monkeypatch):
         ("orthoglide", ["--drives", "1N/um", "--along", "X"], "--along: goes with a map"),
         ("orthoglide", ["--drives", "1N/um", "--along", "B", "-o", "x.png"], '--along: "B", expected one of X Y Z'),
         ("orthoglide", ["--drives", "1N/um", "-o", "x.gif"], "expected a file name that ends in .png, .pdf, .svg"),
-        ("orthoglide", ["--drives", "1N/um", "--samples", "0"], "samples: a number from 1"),
-        ("orthoglide", [], "drives: the machine's file says no stiffness of rho_x"),
+        ("orthoglide", ["--drives", "1N/um", "--samples", "0"], "--samples: a number from 1"),
+        ("orthoglide", [], "--drives: the machine's file says no stiffness of rho_x"),
     ],
 )
 def test_what_is_mistaken_is_said_in_one_line(name, words, message, capsys):

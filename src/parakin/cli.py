@@ -34,7 +34,7 @@ from .commands.stiffness import stiffness
 from .commands.studio import make_studio_command
 from .commands.sweep import sweep
 from .commands.workspace import workspace
-from .errors import InputError, ParakinError
+from .errors import InputError, ParakinError, PoseError
 from .version import __version__
 
 _MALFORMED = 2
@@ -68,12 +68,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
         sys.stdout.reconfigure(errors="backslashreplace")  # a terminal may not know the sign for degrees
     if threading.current_thread() is threading.main_thread():
         signal.signal(signal.SIGTERM, _exit_on_signal)  # so that half-written files are removed
+    words = list(sys.argv[1:] if arguments is None else arguments)
     try:
-        words = list(sys.argv[1:] if arguments is None else arguments)
         if words[:1] != [_COMPLETE]:  # there the last word may be empty, as it is typed so far
             _check_words(words)
         code = app(words, exit_on_error=False, print_error=False, result_action="return_value")
         sys.stdout.flush()
+    except PoseError as error:
+        print_remark(_name_option(error, app[words[0]]))
+        return _MALFORMED
     except ParakinError as error:
         print_remark(str(error))
         return _MALFORMED
@@ -107,6 +110,15 @@ def _check_words(words: Sequence[str]) -> None:
         if not word or (equals and not value and option.startswith("-")):
             behind = f"behind {words[k - 1]}" if k and not word else f"for {option}" if word else "in front"
             raise InputError(f"an empty value {behind}; expected a file, a name or a value", "parakin")
+
+
+def _name_option(error: PoseError, command: App) -> str:
+    """Write a refusal with the command's option in place of the argument that it begins with."""
+    name = error.argument
+    for argument in command.assemble_argument_collection():
+        if argument.field_info.name == name and argument.name.startswith("--"):
+            return argument.name + str(error).removeprefix(name)
+    return str(error)
 
 
 def _replace_closed_streams() -> bool:

@@ -70,7 +70,12 @@ class DescriptionError(ParakinError):
 
 
 class PoseError(ParakinError):
-    """Poses or joints of the wrong shape, type or mode."""
+    """Poses or joints of the wrong shape, type or mode, or another argument that can't be."""
+
+    @property
+    def argument(self) -> str:
+        """The name that the message begins with, which is that of the argument at fault where one is told."""
+        return re.split("[^a-z_]", str(self), maxsplit=1)[0]
 
 
 class NoMethodError(ParakinError):

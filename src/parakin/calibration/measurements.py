@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from math import inf
 from typing import Literal, get_args
 
 import numpy as np
@@ -14,6 +13,7 @@ from ..errors import PoseError, quote, suggest
 from ..machine import Machine
 
 LETTERS = "XYZ"
+_MOST_NOISE = 1e6  # mm and rad: beyond all that is measured
 MeasuringFrame = Literal["machine", "instrument"]
 
 
@@ -179,6 +179,6 @@ def check_measured_axes(machine: Machine, names: tuple[str, ...]) -> None:
 def check_noise(noise: Noise) -> None:
     """Refuse standard deviations that are not positive (of what drives say: not negative)."""
     for name in ("length", "angle"):
-        check_range(f"noise {name}", getattr(noise, name), 1e-9, inf)
+        check_range(f"noise {name}", getattr(noise, name), 1e-9, _MOST_NOISE)
     for name in ("slide", "turn"):
-        check_range(f"noise {name}", getattr(noise, name), 0.0, inf)
+        check_range(f"noise {name}", getattr(noise, name), 0.0, _MOST_NOISE)

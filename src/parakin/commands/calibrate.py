@@ -13,7 +13,7 @@ from ..export.figure_file import PICTURES
 from ..export.number_format import format_fixed
 from ..units import ANGLE, LENGTH, QuantityError, QuantityKind, name_display_unit, parse_quantity, to_display
 from .console import announce_compiling, format_table, print_json, print_text
-from .options import Json, Name, OutputPath, Sizes, load_machine, require_ending
+from .options import Json, Name, OutputPath, Sizes, load_machine, require_ending, tell_options
 
 if TYPE_CHECKING:
     from ..arrays import Array
@@ -113,7 +113,9 @@ def _calibrate(machine: Machine, rows: Measurements, path: Path, free: list[str]
 
     try:
         return calibrate_machine(machine, rows, free, "linear" if plain else "soft_l1")
-    except PoseError as error:  # of what the file holds
+    except PoseError as error:
+        if error.argument == "free":
+            raise
         raise InputError(str(error), str(path)) from None
 
 
@@ -242,7 +244,8 @@ def _plan(
     from ..calibration.measurement_plan import plan_measurements
     from ..export.tables.poses import PoseTable, format_pose_csv
 
-    result = plan_measurements(machine, count, free, measure, noise)
+    with tell_options(count="--plan", axes="--measure"):
+        result = plan_measurements(machine, count, free, measure, noise)
     table = format_pose_csv(PoseTable(machine, result.poses, result.joints, [""] * len(result.poses)))
     files = {} if output is None else _write({"plan": (output, table)})
     if json:

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import re
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from glob import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
-from ..errors import InputError, InputErrors, quote
+from ..errors import InputError, InputErrors, PoseError, quote
 
 if TYPE_CHECKING:
     from ..machine import Machine
@@ -66,6 +68,20 @@ def require_ending(path: Path | None, endings: Sequence[str], option: str = "--o
     """Refuse a file that a command can't write, by its ending."""
     if path is not None and path.suffix.lower() not in endings:
         raise InputError(f"{quote(str(path))}: expected a file name that ends in {', '.join(endings)}", option)
+
+
+@contextmanager
+def tell_options(**options: str) -> Iterator[None]:
+    """Tell what a call refuses by the options that gave its arguments: ``count: ...`` as ``--plan: ...``.
+
+    options : by the names of the arguments; those that an option of the same name gives need none
+    """
+    try:
+        yield
+    except PoseError as error:
+        if error.argument not in options:
+            raise
+        raise InputError(re.sub(r"^\w+:? ?", "", str(error)), options[error.argument]) from None
 
 
 def load_machine(name: str, sizes: Sequence[str] | None = None) -> Machine:

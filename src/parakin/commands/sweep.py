@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from ..errors import InputError, PoseError
 from .console import ProgressBar, announce_compiling, print_json, print_remark, print_text
 from .options import OFF_LIMITS, Json
 
@@ -54,11 +53,7 @@ def sweep(
     from ..export.sweep_folder import run_sweep
     from ..synthesis.sweep import SweepPlan
 
-    try:
-        plan = SweepPlan(wanted, designs, poses, seed)
-    except PoseError as error:
-        option, _, message = str(error).partition(": ")
-        raise InputError(message, f"--{option}") from None
+    plan = SweepPlan(wanted, designs, poses, seed)
     with ProgressBar() as bar:
         report = bar.stage("designs", 0.0, 1.0)
         result = run_sweep(plan, output, scheduler, report, lambda link: print_remark(f"dashboard {link}"))

@@ -7,7 +7,8 @@ from math import ceil
 from typing import TYPE_CHECKING, Literal
 
 from ..budget import SECONDS
-from ..errors import InputError, PoseError
+from ..errors import InputError
+from .options import tell_options
 
 if TYPE_CHECKING:
     from ..arrays import Progress
@@ -45,15 +46,10 @@ def find_workspace(method: Method, region: Region, effort: Effort, progress: Pro
     for option in ("gap", "cell"):
         if getattr(effort, option) is not None:
             raise InputError(f"--method {method} has none, only certified has", f"--{option}")
-    try:
+    with tell_options(seconds="--time"):
         if method == "drives":
             return _sweep_drives(region, effort, progress)
         return _sample_positions(method, region, effort, progress)
-    except PoseError as error:
-        name, colon, rest = str(error).partition(": ")
-        if colon and name == "seconds":
-            raise InputError(rest, "--time") from None
-        raise
 
 
 def _certify_workspace(region: Region, effort: Effort, progress: Progress) -> Workspace:

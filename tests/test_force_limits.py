@@ -252,6 +252,13 @@ def test_masses_follow_what_the_file_says(tmp_path):
     assert masses == pytest.approx({"platform": 80.0, "carriage": 75.0, "rod": 3 * 2 * 7850e-9 * tube})
 
 
+def test_a_motor_asks_for_its_inertia_times_the_acceleration(tmp_path):
+    still, rates = np.zeros((1, 3)), np.array([[900.0, -400.0, 250.0]])
+    bare, whole = (load(tmp_path, ("inertia: 30 kg", text)) for text in ("inertia: 1e-9 kg", "inertia: 30 kg"))
+    asked = [Dynamics(m).compute_forces(Motion(still, m.inverse(still), 2.0 * rates, rates)) for m in (bare, whole)]
+    assert asked[1] - asked[0] == pytest.approx(30.0 * rates * 1e-3, rel=1e-9)
+
+
 def test_stiffness_is_what_the_file_says(tmp_path):
     machine = load(tmp_path)
     poses = [[0.0, 0.0, 0.0], [60.0, -30.0, 20.0]]

@@ -72,7 +72,7 @@ def test_too_short_a_time_is_the_want_that_no_design_keeps(path):
     free, shift, bounds = {"rod": (650.0, 800.0)}, {"Z": (-400.0, 400.0)}, {"cycle_time": 1e-3}
     problem = pk.DesignProblem(DELTA, free, BOX, ["rod"], shift, bounds, path=path, workpiece=PLACE)
     said = pk.find_designs(problem, seconds=10.0).shortfall
-    assert re.search(r"breaks cycle_time: 0\.\d+ where at most 0.001 is wanted", said)
+    assert re.search(r"breaks cycle_time: 0\.\d+ s where at most 0.001 s is wanted", said)
 
 
 def test_a_part_moves_with_the_poses(path):

@@ -236,7 +236,7 @@ def test_the_want_that_no_design_keeps_is_named(capsys, tmp_path):
     assert main(["design", str(path)]) == 3
     said = capsys.readouterr().out
     assert "breaks accuracy" in said
-    assert "where at most 0.0001 is wanted" in said
+    assert " mm where at most 0.0001 mm is wanted" in said
 
 
 @pytest.mark.parametrize(

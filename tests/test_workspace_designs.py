@@ -71,7 +71,7 @@ def test_no_drawn_lambda_is_larger_than_the_examples():
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"fit_strokes": True}, "workspace: the drives' ranges are fitted; let them be the machine's own"),
+        ({"fit_strokes": True}, "fit_strokes: the drives' ranges are fitted, workspace needs the machine's own"),
         ({"bounds": {"workspace": 1e6}}, "bounds: workspace has none; it can be an objective"),
         ({"maximise": (), "minimise": ["workspace"]}, "minimise: of workspace more is better; it belongs to maximise"),
     ],

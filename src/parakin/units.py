@@ -121,6 +121,9 @@ _MOTION_UNITS = _build_units()
 UNITS = _MOTION_UNITS | _build_load_units()  # factor to mm, rad, s and N, and dimension, by name
 
 
+LONGEST = 1e6  # mm, 1 km: far beyond any machine, and small enough that no result overflows
+
+
 def parse_quantity(text: str, kind: QuantityKind, names: Mapping[str, Quantity | None] | None = None) -> float:
     """Evaluate an expression that must be of a kind; return its value in mm, rad and s. A bare 0 needs no unit.
 

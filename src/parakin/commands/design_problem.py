@@ -24,7 +24,7 @@ _KEYS = (
     "machine", "free", *_POSES, "shift", "bounds", "strokes", "drives", "struts", "tolerances", "within", "part",
     "workpiece", "minimise", "maximise",
 )  # fmt: skip
-_KEYS_OF_ARGUMENTS = {"path": "part"}
+_KEYS_OF_ARGUMENTS = {"path": "part", "fit_strokes": "strokes"}
 _STROKES = ("keep", "fit")
 _CYLINDER = ("along", "diameter")
 

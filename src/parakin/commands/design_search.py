@@ -89,6 +89,5 @@ def _format_designs(designs: Designs) -> str:
     for number, found in enumerate(designs.front, 1) if problem.fit_strokes else ():
         lines.append(f"{number}: {describe_ranges(found)}")
     for failed in designs.unproved:
-        sizes = ", ".join(f"{name} {value:{_NUMBERS}}" for name, value in failed.sizes.items())
-        lines.append(f"not proved: {sizes}: {failed.reason}")
+        lines.append(f"not proved: {problem.format_variables(failed.sizes, _NUMBERS)}: {failed.reason}")
     return "\n".join(lines)

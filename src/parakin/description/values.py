@@ -31,6 +31,7 @@ from ..units import (
     INERTIA,
     JERK,
     LENGTH,
+    LONGEST,
     MASS,
     MODULUS,
     NUMBER,
@@ -153,7 +154,7 @@ _LOADS = (FORCE, TORQUE, POWER, MASS, INERTIA, DENSITY, STIFFNESS, ANGULAR_STIFF
 # Far beyond any machine, and small enough that no result overflows.
 _USUAL_BOUNDS: dict[QuantityKind, ValidRange] = {
     NUMBER: (-1e6, 1e6, "-1e6 to 1e6"),
-    LENGTH: (-1e6, 1e6, "-1 km to 1 km"),
+    LENGTH: (-LONGEST, LONGEST, "-1 km to 1 km"),
     ANGLE: (-1e4, 1e4, "-10000 rad to 10000 rad"),
     **{kind: (0.0, 1e9, f"more than 0 ({kind.units})") for kind in _SPEEDS},
     **{kind: (0.0, 1e12, f"more than 0 ({kind.units})") for kind in (*_JERKS, *_LOADS)},
@@ -218,7 +219,7 @@ def _normalise_vector(value: Vector) -> Vector:
 LengthValue = Annotated[float, accept_quantity(LENGTH)]
 AngleValue = Annotated[float, accept_quantity(ANGLE)]
 Number = Annotated[float, accept_quantity(NUMBER)]
-Extent = Annotated[float, accept_quantity(LENGTH, (0.0, 1e6, "more than 0 mm, at most 1 km"))]
+Extent = Annotated[float, accept_quantity(LENGTH, (0.0, LONGEST, "more than 0 mm, at most 1 km"))]
 Opening = Annotated[float, accept_quantity(ANGLE, (0.0, pi, "more than 0 deg, at most 180 deg"))]
 _PAIR = _require_count(2, "a pair [low, high]")
 LengthPair = Annotated[tuple[LengthValue, LengthValue], _PAIR, WrapValidator(_check_rising)]

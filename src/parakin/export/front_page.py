@@ -112,7 +112,7 @@ def _render_table(designs: Designs) -> str:
 def _render_unproved(designs: Designs) -> str:
     lines = []
     for failed in designs.unproved:
-        sizes = ", ".join(f"{name} {value:{_NUMBERS}}" for name, value in failed.sizes.items())
+        sizes = designs.problem.format_variables(failed.sizes, _NUMBERS)
         lines.append(f"<p>{escape(f'{sizes}: {failed.reason}')}</p>\n")
     return make_card("Found, but not proved", "".join(lines))
 

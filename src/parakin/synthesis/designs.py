@@ -177,13 +177,14 @@ def _measure_value(problem: DesignProblem, candidate: Candidate, name: str) -> f
 
 
 def _describe_shortfall(problem: DesignProblem, nearest: Candidate) -> str:
-    sizes = ", ".join(f"{name} {value:.6g}" for name, value in zip(problem.variables, nearest.x, strict=True))
+    sizes = problem.format_variables(dict(zip(problem.variables, nearest.x.tolist(), strict=True)), ".6g")
     want = nearest.want
     if want in problem.bounds:
-        value = _measure_value(problem, nearest, want)
-        reserve = problem.reserve.losses.get(want, 0.0)
-        want += f": {value:.6g} where at {'least' if WANTS[want].more else 'most'} {problem.bounds[want]:.6g} is wanted"
-        want += f" and {reserve:.6g} kept in hand for tolerances" if reserve else ""
+        own, reserve = WANTS[want], problem.reserve.losses.get(want, 0.0)
+        values = _measure_value(problem, nearest, want), problem.bounds[want], reserve
+        value, bound, kept = (own.format_value(number, ".6g") for number in values)
+        want += f": {value} where at {'least' if own.more else 'most'} {bound} is wanted"
+        want += f" and {kept} kept in hand for tolerances" if reserve else ""
     return f"no design found that keeps every want; the nearest one ({sizes}) breaks {want}"
 
 
@@ -233,7 +234,7 @@ def _prove_design(problem: DesignProblem, made: _MadeDesign, budget: Budget) -> 
     for name, bound in problem.bounds.items():
         sign = WANTS[name].sign
         if sign * values[name] > sign * bound + TOLERANCE * abs(bound):
-            return UnprovedDesign(sizes, f"{name} is {values[name]:.9g}")
+            return UnprovedDesign(sizes, f"{name} is {WANTS[name].format_value(values[name], '.9g')}")
     proof = DesignProof(problem, machine, problem.move_sets(made.x), numbers, budget)
     wanted = {name: _find_wanted(problem, name, values[name]) for name in problem.wants}
     margins = {name: bound for name, bound in wanted.items() if isinstance(WANTS[name].proof, MarginProof)}
@@ -249,8 +250,9 @@ def _prove_design(problem: DesignProblem, made: _MadeDesign, budget: Budget) -> 
         worst = proof.bound_norm(name, wanted[name], seconds)
         proved[name] = worst
         if name in problem.bounds and not _is_kept(name, worst, problem.bounds[name]):
-            limit = "nothing" if worst is None else f"{worst:.9g}"
-            return UnprovedDesign(sizes, f"{name} is {values[name]:.9g} where it was looked at, and {limit} is proved")
+            limit = "nothing" if worst is None else WANTS[name].format_value(worst, ".9g")
+            seen = WANTS[name].format_value(values[name], ".9g")
+            return UnprovedDesign(sizes, f"{name} is {seen} where it was looked at, and {limit} is proved")
     if problem.gauge is not None:
         values["workspace"] = proved["workspace"] = problem.gauge.prove(machine, budget.seconds_left)
     drives = {drive.name: (drive.low, drive.high) for drive in machine.drives[: machine.leg_count]}

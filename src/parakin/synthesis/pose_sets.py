@@ -15,6 +15,7 @@ from ..errors import PoseError, quote, suggest
 from ..machine import Machine
 from ..performance.certified.interval_matrices import PoseBox
 from ..performance.characteristic_length import CharacteristicLength
+from ..units import LONGEST
 from ..workspaces.certified.constraints import TracedPose
 
 _TRANSLATIONS = "XYZ"
@@ -151,6 +152,8 @@ def make_box_set(machine: Machine, axes: Mapping[str, AxisRange | float], what: 
         low, high = (own, own) if isinstance(own, (int, float)) else own
         if not (isfinite(low) and isfinite(high) and low <= high):
             raise PoseError(f"{what}: {axis}: a range that rises expected, not {low:g} to {high:g}")
+        if max(abs(low), abs(high)) > LONGEST:
+            raise PoseError(f"{what}: {axis}: {low:g} to {high:g} is out of range, at most 1 km expected")
         ends[axis] = (low, high)
     return PoseSet(machine.axes, ends)
 
@@ -166,8 +169,8 @@ def make_cylinder_set(machine: Machine, said: Mapping[str, AxisRange | float | s
     along, diameter = said["along"], said["diameter"]
     if along not in tuple(_TRANSLATIONS):
         raise PoseError(f"cylinder: along: {quote(along)}{suggest(str(along), tuple(_TRANSLATIONS))}")
-    if not (isinstance(diameter, (int, float)) and isfinite(diameter) and diameter > 0.0):
-        raise PoseError("cylinder: a diameter above 0 mm expected")
+    if not (isinstance(diameter, (int, float)) and 0.0 < diameter <= LONGEST):
+        raise PoseError("cylinder: a diameter above 0 mm expected, at most 1 km")
     axes = {key: ends for key, ends in said.items() if key != "diameter" and not isinstance(ends, str)}
     whole = make_box_set(machine, axes, "cylinder")
     across = tuple(axis for axis in machine.axes if axis in _TRANSLATIONS and axis != along)

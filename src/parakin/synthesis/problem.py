@@ -15,6 +15,7 @@ from ..errors import PoseError, quote, suggest
 from ..families.family import Family
 from ..machine import Machine
 from ..toolpath.path import ToolPath
+from ..units import LONGEST, name_display_unit, to_display
 from .design_tapes import DesignTapes
 from .manufactured import Reserve, SizeBox
 from .measures import Measures
@@ -94,6 +95,8 @@ class DesignProblem:
             for name, (low, high) in ranges.items():
                 if not (isfinite(low) and isfinite(high) and low < high):
                     raise PoseError(f"{what}: {name}: a range that rises expected, not {low:g} to {high:g}")
+                if max(abs(low), abs(high)) > LONGEST:
+                    raise PoseError(f"{what}: {name}: {low:g} to {high:g} is out of range, at most 1 km expected")
         self._check_poses()
         self._check_wants()
         nominal = {parameter.name: parameter.value for parameter in self.family.parameters}
@@ -138,10 +141,10 @@ class DesignProblem:
                 f"bounds: they contradict: amplification wants psi above {low}, greatest_amplification below"
             )
         if "stroke" in self.wants and not self.fit_strokes:
-            raise PoseError("stroke: the drives' ranges are the machine's own; let them be fitted to the box")
+            raise PoseError("fit_strokes: the drives' ranges are the machine's own, stroke needs them fitted")
         if "workspace" in self.wants:
             if self.fit_strokes:
-                raise PoseError("workspace: the drives' ranges are fitted; let them be the machine's own")
+                raise PoseError("fit_strokes: the drives' ranges are fitted, workspace needs the machine's own")
             self.gauge  # noqa: B018  refuses a workspace without end
         if "clearance" in self.wants and not self.machine.trace_equations({}).list_strut_distances(
             self.machine.home.tolist(), self.machine.mode
@@ -224,6 +227,12 @@ class DesignProblem:
     def variables(self) -> tuple[str, ...]:
         """The free numbers, in the family's order, and the shifts."""
         return (*self.family.names, *(f"shift {key}" for key in self.shift))
+
+    def format_variables(self, values: Mapping[str, float], digits: str) -> str:
+        """Format values of the variables in a line, each with its unit; ``digits`` is a format."""
+        units = {parameter.name: parameter.unit for parameter in self.family.parameters}
+        own = ((name, value, units.get(name, "mm")) for name, value in values.items())
+        return ", ".join(f"{name} {to_display(value, u):{digits}} {name_display_unit(u)}" for name, value, u in own)
 
     @cached_property
     def ranges(self) -> Array:

@@ -65,6 +65,10 @@ class Want:
         """The unit of its value; none of a number."""
         return _UNITS[self.kind]
 
+    def format_value(self, value: float, digits: str) -> str:
+        """Format a value with its unit; ``digits`` is a format."""
+        return f"{value:{digits}} {self.unit}".rstrip()
+
     @property
     def sign(self) -> float:
         """What makes less of it better."""

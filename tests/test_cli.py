@@ -162,7 +162,7 @@ def test_bad_machines(part, out, tmp_path, capsys):
     [
         (["--workpiece", "1,2"], "--workpiece: "),
         (["--workpiece", "-1,2"], "--workpiece: "),
-        (["--mode", "++"], "mode '++'"),
+        (["--mode", "++"], "--mode '++'"),
         (["--arc-tolerance", "0"], "--arc-tolerance: "),
         (["--arc-tolerance", "nan"], "--arc-tolerance: "),
         (["--arc-tolerance", "x"], "--arc-tolerance"),
@@ -172,7 +172,7 @@ def test_bad_machines(part, out, tmp_path, capsys):
         (["--set", "RR=3mm"], "--set: "),
         (["--set", "R=3mm", "--set", "R=4mm"], "--set: "),
         (["--parket"], "--parquet"),
-        (["extra"], "extra"),
+        (["extra"], 'parakin: post takes no more values, got "extra"'),
     ],
 )
 def test_bad_options(part, out, capsys, options, said):
@@ -458,3 +458,7 @@ def test_bash_completes_machines_files_and_parts(tmp_path):
     done = run("bash", "-c", f'. ../complete\n{steps}', cwd=tmp_path / "work",
                env={**os.environ, "PATH": f"{shell.parent}:{os.environ['PATH']}"})  # fmt: skip
     assert done.stdout.splitlines() == list(asked.values())
+
+
+def test_a_page_of_a_part_asks_for_its_machine(part, capsys):
+    assert "needs the machine that it is for; expected --machine" in refused(capsys, "page", part)

@@ -251,7 +251,7 @@ def test_curves_of_the_sweeps(capsys):
         (["--every", "B=10:-10"], '--every: B: "10:-10" is empty'),
         (["--some", "X=0:10"], "--some: X is no turning axis"),
         (["--at", "B=0", "--every", "B=0:5"], "B is fixed and swept"),
-        (["--every", "B=0:5", "--some", "C=0:5"], "one of every, some"),
+        (["--every", "B=0:5", "--some", "C=0:5"], "--some: goes without --every"),
         (["--without", "nothing*"], "--without: no limit nothing*"),
         (["--without", "d?.max"], "do not bound"),
         (["--mode", "+++"], "--mode"),

@@ -11,7 +11,7 @@ import warnings
 from collections.abc import Sequence
 from contextlib import suppress
 
-from cyclopts import App, CycloptsError, Parameter
+from cyclopts import App, CycloptsError, Parameter, UnusedCliTokensError
 
 from .commands.accuracy import accuracy
 from .commands.assemblies import assemblies
@@ -34,7 +34,7 @@ from .commands.stiffness import stiffness
 from .commands.studio import make_studio_command
 from .commands.sweep import sweep
 from .commands.workspace import workspace
-from .errors import InputError, ParakinError, PoseError
+from .errors import InputError, ParakinError, PoseError, join_words, quote
 from .version import __version__
 
 _MALFORMED = 2
@@ -79,6 +79,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return _MALFORMED
     except ParakinError as error:
         print_remark(str(error))
+        return _MALFORMED
+    except UnusedCliTokensError as error:
+        values = join_words([*map(quote, error.unused_tokens or ())])
+        print_remark(f"parakin: {words[0]} takes no more values, got {values}")
         return _MALFORMED
     except CycloptsError as error:
         print_remark(f"parakin: {' '.join(str(error).split())}")

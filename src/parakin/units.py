@@ -144,7 +144,7 @@ def evaluate_expression(text: str, names: Mapping[str, Quantity | None] | None =
 
     Raises :class:`QuantityError`.
     """
-    return _ExpressionParser(text, names or {}).parse()
+    return _ExpressionParser(text, names).parse()
 
 
 def to_display(value: float, unit: str) -> float:
@@ -207,7 +207,7 @@ _DEEPEST = 40  # nested factors: far more than a person writes, far fewer than P
 class _ExpressionParser:
     """Parse by recursive descent: a sum of products of factors, with signs, brackets and functions."""
 
-    def __init__(self, text: str, names: Mapping[str, Quantity | None]):
+    def __init__(self, text: str, names: Mapping[str, Quantity | None] | None):
         self.text, self.names, self.at, self.depth = text.rstrip(), names, 0, 0
         if not self.text:
             raise QuantityError("nothing here, expected a number with its unit or an expression")
@@ -299,6 +299,8 @@ class _ExpressionParser:
                 return _FUNCTIONS[name](argument)
             except QuantityError as error:
                 raise QuantityError(f"{quote(self.text)}: {error}") from None
+        if self.names is None:
+            raise QuantityError(f"{quote(self.text)}: expected a number, got {quote(name)}")
         if name in self.names:
             size = self.names[name]
             if size is None:

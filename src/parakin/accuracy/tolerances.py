@@ -81,7 +81,7 @@ def make_tolerance_family(machine: Machine, tolerances: Sequence[Tolerance]) -> 
     """
     owner: dict[str, int] = {}
     for index, tolerance in enumerate(tolerances):
-        chosen = select_parameters(machine, [tolerance.name])
+        chosen = select_parameters(machine, [tolerance.name], f"tolerance {tolerance.name}")
         of_unit = [p for p in chosen if p.unit == tolerance.unit]
         if not of_unit:
             wanted = "an angle" if chosen[0].unit == "rad" else "a length"

@@ -13,7 +13,7 @@ from ..export.figure_file import PICTURES
 from ..export.number_format import format_fixed
 from ..units import LENGTH, QuantityError, name_display_unit, parse_quantity, to_display
 from .console import announce_compiling, format_table, print_json, print_text
-from .options import Json, Name, OutputPath, Sizes, load_machine, require_ending
+from .options import Json, Name, OutputPath, Sizes, load_machine, require_ending, tell_options
 from .region_options import parse_axis_ranges, parse_time
 
 if TYPE_CHECKING:
@@ -76,7 +76,8 @@ def accuracy(
     from ..workspaces.sampled.allowed_poses import SAMPLES
 
     result = analyse_accuracy(machine, stated, samples=SAMPLES if samples is None else samples)
-    allowed = None if wanted is None else allocate_tolerances(result, wanted, costs)
+    with tell_options(costs="--cost"):
+        allowed = None if wanted is None else allocate_tolerances(result, wanted, costs)
     proved = None if over is None else bound_worst_case(result, ranges, _LONGEST if seconds is None else seconds)
     files = _write_map(result, output)
     if json:

@@ -59,7 +59,7 @@ def calibrate(
         A CSV file with a header: the joints, and what was measured there: all axes of the pose, some of X, Y, Z, the
         tip's distance from a point (distance), its height over a plane (height); mm and degrees, or a unit: X [in].
     free
-        A number that may change: its name, a pattern such as legs.*.foot.*, or a group (feet, platform, rods, rails,
+        A number that may change: its name, a pattern such as legs.*.foot.z, or a group (feet, platform, rods, rails,
         encoders, mounting, head, table). May be given again; by default all that measurements of poses tell.
     noise
         The standard deviation of a measured length; by default 10um.

@@ -62,6 +62,10 @@ def page(
     force
         Overwrite a file that parakin did not write.
     """
+    from ..toolpath.reading.detect import PART_SUFFIXES
+
+    if machine is None and Path(name).suffix.lower() in PART_SUFFIXES:
+        raise InputError("a part needs the machine that it is for; expected --machine", name)
     chosen = load_machine(name if machine is None else machine, sizes)
     if machine is None and (workpiece, tool_length, mode) != (None, None, None):
         raise InputError("only a part has a workpiece, a tool length and a mode; expected --machine", name)

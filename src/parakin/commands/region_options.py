@@ -59,17 +59,20 @@ def read_region(
     all_parts: bool = False,
 ) -> Region:
     """Make the region that the options describe; an error names the option that is invalid."""
-    from ..workspaces.certified.region import make_region
+    from ..workspaces.certified.region import CountedComponents, make_region
 
+    swept = [name for name, value in (("every", every), ("some", some), ("dexterous", dexterous)) if value]
+    if len(swept) > 1:
+        raise InputError(f"goes without --{swept[0]}", f"--{swept[1]}")
     arguments: dict[str, Any] = {
         "at": parse_axis_values(machine, at, "--at"),
         "every": parse_axis_ranges(machine, every, "--every"),
         "some": parse_axis_ranges(machine, some, "--some"),
         "without": without or (),
-        "mode": mode,
     }
+    components: CountedComponents = "all" if all_parts else "home"
     try:
-        return make_region(machine, dexterous=dexterous, components="all" if all_parts else "home", **arguments)
+        return make_region(machine, dexterous=dexterous, mode=mode, components=components, **arguments)
     except PoseError:
         for option, value in arguments.items():
             try:

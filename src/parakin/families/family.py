@@ -105,15 +105,18 @@ def make_family(machine: Machine, free: Sequence[str]) -> Family:
     return Family(machine, select_parameters(machine, free))
 
 
-def select_parameters(machine: Machine, patterns: Sequence[str]) -> tuple[Parameter, ...]:
-    """Select a machine's parameters by names, patterns, or names of groups, in the machine's order."""
+def select_parameters(machine: Machine, patterns: Sequence[str], argument: str = "free") -> tuple[Parameter, ...]:
+    """Select a machine's parameters by names, patterns, or names of groups, in the machine's order.
+
+    Raises :class:`PoseError` with the name of the ``argument`` for one that is unknown.
+    """
     known = machine.parameters
     chosen: set[str] = set()
     for pattern in patterns:
         names = {p.name for p in known if fnmatchcase(p.name, pattern) or p.group == pattern}
         if not names:
             words = [p.name for p in known] + sorted({p.group for p in known})
-            raise PoseError(f"free: unknown {quote(pattern)}{suggest(pattern, words)}")
+            raise PoseError(f"{argument}: unknown {quote(pattern)}{suggest(pattern, words)}")
         chosen |= names
     return tuple(p for p in known if p.name in chosen)
 

@@ -16,6 +16,7 @@ from .text import BYTE_ORDER_MARK, open_file
 
 _GCODE_SUFFIXES = frozenset((".ngc", ".nc", ".gcode", ".tap", ".cnc"))
 _CL_SUFFIXES = frozenset((".apt", ".aptsource", ".cl", ".cls", ".ncl"))
+PART_SUFFIXES = _GCODE_SUFFIXES | _CL_SUFFIXES
 _LOOKED_AT = 1 << 16  # bytes
 _JOINTS = b"joints, made by parakin"  # stands in the head of a program of joint positions
 # beginnings of lines that only one of the two formats can have

@@ -1,0 +1,90 @@
+"""README.md and the commands that pages name: tables, options, files, and the Python that is shown."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+import parakin as pk
+from parakin.cli import app
+from parakin.units import name_display_unit
+
+ROOT = Path(__file__).parents[1]
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").rglob("*.md"))]
+COMMANDS = {name for name in app if not name.startswith("-")}
+OTHERS = ("columns on a circular rail", "two slides on a rail for each leg")  # families of few machines
+
+
+def read_table(heading):
+    """The rows of the table below a heading of the README."""
+    lines = README.partition(f"\n## {heading}\n")[2].partition("\n## ")[0].splitlines()
+    return [
+        [cell.strip() for cell in re.split(r"(?<!\\)\|", line.strip("|"))] for line in lines if line.startswith("|")
+    ][2:]
+
+
+def list_options(command):
+    """The options of a command, as they are typed."""
+    return {name for argument in app[command].assemble_argument_collection() for name in argument.names}
+
+
+def test_the_table_of_machines_is_that_of_the_command():
+    family, named = "", []
+    for row in read_table("Machines"):
+        if not row[1]:
+            family = row[0].strip("*")
+            continue
+        for name in re.findall(r"`(\w+)`", row[0]):
+            machine = pk.load(name)
+            named.append(name)
+            own = next(leg for leg in machine.spec.legs).family
+            assert own == family or (family == "others" and own in OTHERS), name
+            assert row[2].split() == [*machine.axes], name
+            counts = re.findall(r"(\d+) (\w+)", row[3])
+            assert sum(int(count) for count, _ in counts) == len(machine.joints), name
+            turning = sum(int(count) for count, kind in counts if kind in ("turns", "arms", "carriages", "links"))
+            assert turning == sum(name_display_unit(drive.unit) == "deg" for drive in machine.drives), name
+    assert sorted(named) == sorted(pk.machines())
+
+
+def test_the_table_of_commands_is_that_of_the_command_line():
+    first = [re.match(r"`parakin ([\w-]+)", row[0])[1] for row in read_table("Commands")]
+    assert {*first} == {*COMMANDS, "--install-completion"}
+    for command, text in read_table("Commands"):
+        known = list_options(first.pop(0)) if "--install" not in command else {"--install-completion"}
+        assert {*re.findall(r"(?<![\w-])--[a-z][a-z-]+", command + text)} <= known, command
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
+def test_commands_that_a_page_names_have_their_options(page):
+    text = page.read_text(encoding="utf-8").replace("\\|", "|")
+    commands = re.findall(r"`(?:python -m )?parakin ([^`]+)`", text)
+    commands += re.findall(r"^(?:\$ |    )?parakin (.+)$", text, re.M)
+    for words in (command.split() for command in commands):
+        if words[0].startswith("-") or not words[0][:1].islower():
+            continue
+        for name in words[0].split("|"):
+            assert name in COMMANDS, words
+            known = list_options(name)
+            for option in re.findall(r"(?<=\s)(--?[a-z][\w-]*)", " ".join(words)):
+                assert option in known, words
+
+
+def test_what_the_readme_links_to_is_there():
+    for page in (ROOT / "README.md", ROOT / "CONTRIBUTING.md", *(ROOT / "docs").rglob("*.md")):
+        for target in re.findall(r"\]\(([^)#\s]+)", page.read_text(encoding="utf-8")):
+            assert target.startswith("http") or (page.parent / target).exists(), f"{page}: {target}"
+
+
+def test_the_python_of_the_readme_runs(tmp_path, monkeypatch):
+    block = re.search(r"```python\n(.*?)```", README, re.S)[1]
+    monkeypatch.chdir(tmp_path)
+    Path("part.cls").write_text("UNITS/MM\nFEDRAT/1000,MMPM\nGOTO/0,0,-1650,0.1,0,1\nGOTO/10,0,-1650\nFINI\n")
+    names = {}
+    for line in block.replace("1_000_000", "1_000").replace("q[:100]", "q[:2]").splitlines():
+        exec(line, names)
+        shown = re.fullmatch(r"(m\.axes, m\.joints)  # (.*)", line)
+        assert not shown or eval(shown[1], names) == eval(shown[2])
+    assert names["s"].converged.all() and names["job"].posted.first is None
+    assert names["w"].volume.inner <= names["w"].volume.outer

@@ -51,6 +51,7 @@ def test_the_table_of_machines_is_that_of_the_command():
 def test_the_table_of_commands_is_that_of_the_command_line():
     first = [re.match(r"`parakin ([\w-]+)", row[0])[1] for row in read_table("Commands")]
     assert {*first} == {*COMMANDS, "--install-completion"}
+    assert {name for name in COMMANDS if "--json" not in list_options(name)} == {"studio"}
     for command, text in read_table("Commands"):
         known = list_options(first.pop(0)) if "--install" not in command else {"--install-completion"}
         assert {*re.findall(r"(?<![\w-])--[a-z][a-z-]+", command + text)} <= known, command

@@ -1,6 +1,7 @@
 """The largest box and sphere without a parallel singularity, against the Orthoglide's closed form and drawn poses."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -8,6 +9,7 @@ from shipped import load_shipped
 
 import parakin as pk
 from parakin.cli import main
+from parakin.machine import Machine
 from parakin.performance.singularities import compute_singularity_margins
 
 GLIDE = load_shipped("orthoglide")
@@ -33,7 +35,7 @@ def test_as_far_as_the_closed_form(shape, expected):
     found = pk.find_nearest_singularity(pk.region(GLIDE), dict.fromkeys("XYZ", (-400.0, 400.0)), shape, 1e-3)
     assert found.inner <= expected <= found.outer * (1.0 + 1e-9)
     assert found.outer == pytest.approx(found.inner, rel=1.1e-3)
-    assert found.reason == "singular"
+    assert found.ended == found.reason == "singular"
     assert compute_singularity_margins(GLIDE, found.pose)[0] == pytest.approx(0.0, abs=1e-9)
     assert (compute_singularity_margins(GLIDE, draw_inside(found, 5000))[:, 0] > 0.0).all()
 
@@ -57,10 +59,36 @@ def test_the_end_of_reach_ends_it_too():
         )
         for by in (30.0, 400.0)
     )
-    assert (whole.inner, whole.outer, whole.pose) == (1.0, 1.0, None)
-    assert far.reason == "out of reach"
+    assert (whole.inner, whole.outer, whole.pose, whole.ended) == (1.0, 1.0, None, "box")
+    assert far.ended == far.reason == "out of reach"
     assert far.inner < far.outer < 1.0
     assert np.isfinite(arms.inverse(draw_inside(far, 2000))).all()
+
+
+def test_ranges_of_drives_do_not_end_it():
+    """A drive's range of ±10 mm about home ends long before the singularity, and is not asked."""
+    spec, home = GLIDE.spec, float(GLIDE.inverse(GLIDE.home)[0])
+    about = {"low": home - 10.0, "high": home + 10.0}
+    legs = tuple(replace(leg, drives=tuple(replace(d, **about) for d in leg.drives)) for leg in spec.legs)
+    own, wide = (
+        pk.find_nearest_singularity(pk.region(machine), dict.fromkeys("XYZ", (-400.0, 400.0)))
+        for machine in (Machine(replace(spec, legs=legs)), GLIDE)
+    )
+    assert own.ended == "singular"
+    assert (own.inner, own.outer) == (wide.inner, wide.outer)
+
+
+@pytest.mark.parametrize(
+    ("ranges", "way", "ended"),
+    [
+        ("X=-200:200,Y=-200:200,Z=-200:200", [], "ended by a singularity at "),
+        ("X=-9:9,Y=-9:9,Z=-9:9", [], "ended by the given box, all of it"),
+        ("X=-200:200,Y=-200:200,Z=-200:200", ["--time", "1e-6"], "ended by the time, not by the machine: "),
+    ],
+)
+def test_the_last_line_says_what_ended_it(ranges, way, ended, capsys):
+    assert main(["atlas", "orthoglide", "--box", ranges, "--grow", "box", *way]) == 0
+    assert capsys.readouterr().out.splitlines()[-1].startswith(ended)
 
 
 def test_the_command(capsys):
@@ -71,7 +99,7 @@ def test_the_command(capsys):
     assert main([*WORDS, "box", "--json"]) == 0
     grown = json.loads(capsys.readouterr().out)["grown"]
     assert 0.99 * NEAREST <= grown["spans"]["X"][1] <= NEAREST
-    assert grown["reason"] == "singular"
+    assert (grown["reason"], grown["ended"]) == ("singular", "singular")
 
 
 @pytest.mark.parametrize(

@@ -123,13 +123,23 @@ def format_distance(grown: SingularityDistance) -> str:
         f"within {', '.join(_list_sides(machine, grown.grown_ranges))}",
         f"the legs close and no parallel singularity is met: proved, {grown.boxes:,} boxes",
     ]
+    met = ""
     if grown.pose is not None:
-        lines.append(
-            f"at {_format_number(scale * grown.outer)} {unit}, {_format_pose(machine, grown.pose)}: {grown.reason}"
-        )
-    elif grown.inner >= grown.outer:
-        lines.append("as large as was asked for")
-    return "\n".join(lines)
+        met = f"at {_format_number(scale * grown.outer)} {unit}, {_format_pose(machine, grown.pose)}"
+    return "\n".join([*lines, _format_end(grown, met)])
+
+
+def _format_end(grown: SingularityDistance, met: str) -> str:
+    """Format what ended the growth; ``met`` is where a singular pose, or one out of reach, was met."""
+    if grown.ended == "singular":
+        return f"ended by a singularity {met}"
+    if grown.ended == "out of reach":
+        return f"ended by the legs' reach {met}"
+    if grown.ended == "box":
+        return "ended by the given box, " + ("all of it" if grown.inner >= grown.outer else "within the tolerance")
+    what = "the time" if grown.ended == "time" else f"the number of boxes, {grown.boxes:,}"
+    rest = f"the nearest that was met is {met}: {grown.reason}" if met else "nothing was met within the given box"
+    return f"ended by {what}, not by the machine: {rest}"
 
 
 def _list_sides(machine: Machine, ranges: Mapping[str, tuple[float, float]]) -> list[str]:

@@ -118,6 +118,7 @@ def encode_distance(grown: SingularityDistance) -> dict[str, Any]:
         "spans": {axis: [to_display(end, units[axis]) for end in ends] for axis, ends in grown.grown_ranges.items()},
         "pose": None if grown.pose is None else encode_pose(machine, grown.pose),
         "reason": grown.reason or None,
+        "ended": grown.ended,
         "boxes": grown.boxes,
     }
 

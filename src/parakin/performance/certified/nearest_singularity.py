@@ -26,6 +26,7 @@ from .interval_matrices import PoseBox
 from .proofs import make_pose_box
 
 Shape = Literal["box", "sphere"]
+End = Literal["singular", "out of reach", "box", "time", "parts"]
 _TOLERANCE = 0.01  # relative, between what is proved and what is met
 _BOXES = 400_000
 _HALVINGS = 50  # of the line on which a singular pose is bracketed
@@ -44,6 +45,8 @@ class SingularityDistance:
     outer : there is one no farther away, or one out of reach; the greatest possible where none was met
     pose : (axes,) that pose; None where none was met
     reason : what is there, for people
+    ended : what ended the growth: a ``singular`` pose, one ``out of reach``, the given ``box``, or the search's
+        ``time`` or number of ``parts``, which leaves what is between both numbers undecided
     boxes : how many parts were examined
     """
 
@@ -55,6 +58,7 @@ class SingularityDistance:
     outer: float
     pose: Array | None
     reason: str
+    ended: End
     boxes: int
 
     def __repr__(self) -> str:
@@ -110,7 +114,8 @@ class _DistanceSearch:
         self.middle, self.half = 0.5 * (box.low + box.high), 0.5 * (box.high - box.low)
         self.along = np.array([axis in "XYZ" for axis in box.ranges])
         self.greatest = 1.0 if shape == "box" else float(self.half[self.along].min())
-        self.outer, self.farthest, self.reason = self.greatest, np.empty(0), ""
+        self.outer, self.farthest = self.greatest, np.empty(0)
+        self.reason: Literal["singular", "out of reach", ""] = ""
         first = box.high - box.low
         self.regular = decide_regular(MatrixBounds(box.parallel, box.inputs, box.trace), first)
         self.reach = decide_nonnegative(MatrixBounds([box.reach], box.inputs, box.trace), first) if box.reach else None
@@ -130,10 +135,14 @@ class _DistanceSearch:
             low, high, nearest = *self._clip(low[kept], high[kept]), nearest[kept]
         inner = min(float(nearest.min(initial=np.inf)), self.outer)
         pose = None if not self.reason else self.box.poses(self._bracket_end()[None])[0]
+        ended: End = self.reason or "box"
+        if inner < (1.0 - tolerance) * self.outer:
+            ended = "parts" if self.budget.used >= self.budget.boxes else "time"
         middle = box.poses(self.middle[None])[0]
         return SingularityDistance(
-            box.machine, self.shape, middle, dict(box.ranges), inner, self.outer, pose, self.reason, self.budget.used
-        )
+            box.machine, self.shape, middle, dict(box.ranges), inner, self.outer, pose, self.reason, ended,
+            self.budget.used,
+        )  # fmt: skip
 
     def _split(self, low: Array, high: Array) -> tuple[Array, Array]:
         """Drop the parts that are proved, and halve the others."""

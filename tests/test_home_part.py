@@ -81,6 +81,16 @@ def test_the_mirror_image_behind_the_base_is_not_counted(load_text, low):
     assert pk.find_largest_box(pk.region(m)).low[2] >= 0.0
 
 
+def test_home_part_and_what_is_elsewhere_are_all_parts_of_swept_orientations():
+    """Cones keep the hexapod's platform on one side of its base: there is nothing elsewhere."""
+    m, ways = load_shipped("hexapod"), dict.fromkeys("ABC", (-pi / 18.0, pi / 18.0))
+    own = pk.workspace(pk.region(m, every=ways), gap=0.1)
+    whole = pk.workspace(pk.region(m, every=ways, components="all"), gap=0.1)
+    elsewhere = measure_elsewhere(own)
+    assert own.volume.inner + elsewhere.inner <= whole.volume.outer
+    assert own.volume.outer + elsewhere.outer >= whole.volume.inner
+
+
 def make_cells(low, size):
     low, size = np.array(low, float), np.array(size, float)
     n = len(low)

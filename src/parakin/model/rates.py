@@ -7,9 +7,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import combinations
 
-from ..algebra import Scalar, Trace, derivative, evaluate_trace, expand_determinant, norm, sqrt
+from ..algebra import Mat, Scalar, Term, Trace, Vec, derivative, evaluate_trace, expand_determinant, norm, sqrt
 from .limits import compute_platform_points, group_joints_by_leg
 from .spec import Spec
 from .structures import Structure
@@ -30,6 +31,87 @@ class TwistRates:
     wrench_norms: list[Scalar]
 
 
+@dataclass(frozen=True, eq=False)
+class TwistTrace:
+    """The closures as a trace whose derivatives are :class:`TwistRates`, each taken when it is asked for.
+
+    pose, joints : scalars of any kind, as are the results
+    given : the inputs of the trace on which the description's own numbers are, none where they are plain numbers
+    """
+
+    spec: Spec
+    structure: Structure
+    pose: Sequence[Scalar]
+    joints: Sequence[Scalar]
+    given: Sequence[Scalar] = ()
+
+    @cached_property
+    def a(self) -> list[list[Scalar]]:
+        """A of :class:`TwistRates`."""
+        x, _, turn = self._inputs
+        return self._differentiate([t for t, axis in zip(x, self.structure.axes, strict=True) if axis in "XYZ"] + turn)
+
+    @cached_property
+    def b(self) -> list[list[Scalar]]:
+        """B of :class:`TwistRates`."""
+        return [[-slope for slope in row] for row in self._differentiate(self._inputs[1])]
+
+    @cached_property
+    def wrench_norms(self) -> list[Scalar]:
+        """Wrench norms of :class:`TwistRates`."""
+        positions = self._evaluate([c for point in self._points for c in point])
+        start, legs = len(self._at_rest), len(self.spec.legs)
+        free = [self._trace.inputs(3, start + 3 * i) for i in range(legs)]  # the platform's joints as variables
+        at = [*self._at_rest, *positions]
+        return [
+            norm(evaluate_trace(self._trace, [derivative(f, c) for c in point], at))
+            for group, point in zip(self._close_legs(free), free, strict=True)
+            for f in group
+        ]
+
+    @cached_property
+    def _trace(self) -> Trace:
+        return self.given[0].trace if self.given else Trace()
+
+    @cached_property
+    def _inputs(self) -> tuple[list[Term], list[Term], list[Term]]:
+        """Variables for the pose, the joints and the structure's small turns."""
+        n, m, k = len(self.pose), len(self.joints), len(self.given)
+        turns = len(self.structure.turns)
+        return self._trace.inputs(n, k), self._trace.inputs(m, k + n), self._trace.inputs(turns, k + n + m)
+
+    @cached_property
+    def _at_rest(self) -> list[Scalar]:
+        return [*self.given, *self.pose, *self.joints, *[0.0] * len(self.structure.turns)]
+
+    @cached_property
+    def _placed(self) -> tuple[Mat, Vec, list[Scalar]]:
+        x, q, turn = self._inputs
+        serial = q[len(q) - sum(step.drive is not None for step in (*self.spec.head, *self.spec.table)) :]
+        return self.structure.closure(x, serial, turn)
+
+    @cached_property
+    def _points(self) -> list[Vec]:
+        rotation, origin, _ = self._placed
+        return compute_platform_points(self.spec, rotation, origin)
+
+    @cached_property
+    def _rows(self) -> list[Scalar]:
+        return [*(f for group in self._close_legs(self._points) for f in group), *self._placed[2]]
+
+    def _close_legs(self, points: Sequence[Vec]) -> list[list[Scalar]]:
+        own = group_joints_by_leg(self.spec, self._inputs[1])
+        return [leg.closures(p, given) for leg, p, given in zip(self.spec.legs, points, own, strict=True)]
+
+    def _evaluate(self, outputs: Sequence[Scalar]) -> list[Scalar]:
+        return evaluate_trace(self._trace, outputs, self._at_rest)
+
+    def _differentiate(self, variables: Sequence[Term]) -> list[list[Scalar]]:
+        slopes = self._evaluate([derivative(f, term) for f in self._rows for term in variables])
+        width = len(variables)
+        return [slopes[i : i + width] for i in range(0, len(slopes), width)]
+
+
 def list_closure_joints(spec: Spec) -> list[int]:
     """List the joint of each leg's closure, as an index in the joint vector."""
     index = {drive.name: i for i, drive in enumerate(spec.drives)}
@@ -43,36 +125,9 @@ def compute_twist_rates(
     joints: Sequence[Scalar],
     given: Sequence[Scalar] = (),
 ) -> TwistRates:
-    """Compute A and B at a pose and its joints, scalars of any kind.
-
-    given : the inputs of the trace on which the description's own numbers are, none where they are plain numbers
-    """
-    trace = given[0].trace if given else Trace()
-    n, m, legs, k = len(pose), len(joints), len(spec.legs), len(given)
-    x, q = trace.inputs(n, k), trace.inputs(m, k + n)
-    turn = trace.inputs(len(structure.turns), k + n + m)
-    free = [trace.inputs(3, k + n + m + len(turn) + 3 * i) for i in range(legs)]  # the platform's joints as variables
-    serial = q[m - sum(step.drive is not None for step in (*spec.head, *spec.table)) :]
-    rotation, origin, tilts = structure.closure(x, serial, turn)
-
-    def closures(points: Sequence[Sequence[Scalar]]) -> list[list[Scalar]]:
-        own = group_joints_by_leg(spec, q)
-        return [leg.closures(p, given) for leg, p, given in zip(spec.legs, points, own, strict=True)]
-
-    points = compute_platform_points(spec, rotation, origin)
-    rows = [*(f for group in closures(points) for f in group), *tilts]
-    twist = [term for term, axis in zip(x, structure.axes, strict=True) if axis in "XYZ"] + turn
-    at_rest = [*given, *pose, *joints, *[0.0] * len(turn)]
-    a = evaluate_trace(trace, [derivative(f, term) for f in rows for term in twist], at_rest)
-    b = evaluate_trace(trace, [-derivative(f, term) for f in rows for term in q], at_rest)
-    positions = evaluate_trace(trace, [c for point in points for c in point], at_rest)
-    wrench_norms = [
-        norm(evaluate_trace(trace, [derivative(f, c) for c in point], [*at_rest, *positions]))
-        for group, point in zip(closures(free), free, strict=True)
-        for f in group
-    ]
-    a_rows, b_rows = [a[i : i + n] for i in range(0, m * n, n)], [b[i : i + m] for i in range(0, m * m, m)]
-    return TwistRates(a_rows, b_rows, wrench_norms)
+    """Compute A and B at a pose and its joints; arguments as of :class:`TwistTrace`."""
+    trace = TwistTrace(spec, structure, pose, joints, given)
+    return TwistRates(trace.a, trace.b, trace.wrench_norms)
 
 
 def trace_determinant(rows: Sequence[Sequence[Scalar]]) -> Scalar:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ...algebra import Scalar, expand_determinant
-from .constraints import Constraint, TracedPose
+from .constraints import Constraint, TracedPose, trace_twist_rows
 from .sign_proofs import SignProof, make_side_proof
 
 PARALLEL_SINGULARITY = "parallel singularity"
@@ -25,13 +25,15 @@ def make_side_constraints(traced: TracedPose) -> tuple[Constraint, Constraint]:
     x, orientation = traced.inputs[:d], traced.inputs[d:]
     sides: tuple[SignProof | None, SignProof | None] = None, None
     height, width = traced.machine.parallel_block
-    if traced.swept_axes and height == width:
+    if height == width:
         inputs = traced.jump_free_inputs
         rows, side = _trace_leg_rows(traced, inputs), 1.0 if scale > 0.0 else -1.0
         sides = make_side_proof(rows, side, inputs), make_side_proof(rows, -side, inputs)
-    return Constraint(PARALLEL_SINGULARITY, margin - ZERO, x, orientation, sign=sides[0]), Constraint(
-        PARALLEL_SINGULARITY, -margin - ZERO, x, orientation, sign=sides[1]
+    own, other = (
+        Constraint(PARALLEL_SINGULARITY, sign * margin - ZERO, x, orientation, sign=proof, sign_first=True)
+        for sign, proof in zip((1.0, -1.0), sides, strict=True)
     )
+    return own, other
 
 
 def _trace_leg_rows(traced: TracedPose, inputs: Sequence[Scalar]) -> list[list[Scalar]]:
@@ -47,7 +49,7 @@ def _scale_at_home(traced: TracedPose) -> float:
     machine = traced.machine
     home = [np.float64(value) for value in machine.home]
     with np.errstate(all="ignore"):
-        whole = machine.trace_rates(home, machine.trace_inverse(home, traced.mode)[0]).a
+        whole = trace_twist_rows(machine, home, traced.mode)
     height, width = machine.parallel_block
     rows = np.array(whole, float)[:height, :width]
     most = float(np.prod(np.sqrt((rows**2).sum(1))))

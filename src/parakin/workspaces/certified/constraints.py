@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from math import isfinite
 
@@ -15,7 +15,8 @@ from ...arrays import Array
 from ...kernels.intervals import IntervalProgram, JumpFreeTrace
 from ...machine import Machine
 from ...model.equations import Equations
-from .sign_proofs import SignProof, make_margin_proof
+from ...model.rates import TwistTrace
+from .sign_proofs import SignProof, make_margin_proof, make_opposite_proof
 from .strut_separation import make_separation_proof
 
 _ROUNDING = 1e-12  # relative, of bounds that limits imply
@@ -34,6 +35,7 @@ class Constraint:
     position, orientation : the inputs: d coordinates of x, mm, and those of θ, rad
     implied : it follows from others, and serves only to prove that they can't hold
     sign : proves the margin's sign over boxes of x, then θ, where the programs don't tell it
+    sign_first : it is asked before the programs, which are many times longer
     """
 
     name: str
@@ -42,6 +44,12 @@ class Constraint:
     orientation: Sequence[Term] = ()
     implied: bool = False
     sign: SignProof | None = None
+    sign_first: bool = False
+
+    def negate(self) -> Constraint:
+        """Make the constraint that is kept where this one is broken."""
+        sign = None if self.sign is None else make_opposite_proof(self.sign)
+        return replace(self, margin=0.0 - self.margin, sign=sign)
 
     @cached_property
     def _trace(self) -> Trace:
@@ -131,7 +139,7 @@ class TracedPose:
     def trace_twist_rows(self, inputs: Sequence[Scalar]) -> list[list[Scalar]]:
         """Trace A of the tool's twist at the pose of these inputs."""
         pose = self.place(inputs)
-        return self.machine.trace_rates(pose, self.machine.trace_inverse(pose, self.mode)[0]).a
+        return trace_twist_rows(self.machine, pose, self.mode)
 
     def build_constraints(self, without: Sequence[str] = ()) -> list[Constraint]:
         """Build the constraints of the machine's limits, but for those named in ``without``, and what they imply."""
@@ -200,6 +208,11 @@ class TracedPose:
                 middle, half = 0.5 * (down + up)[:3], 0.5 * (up - down)[:3]
                 most = (up[3] + np.linalg.norm(half) + np.linalg.norm(leg.platform)) * (1.0 + _ROUNDING)
                 yield leg.drives[0].name, middle, float(most)
+
+
+def trace_twist_rows(machine: Machine, pose: Sequence[Scalar], mode: str) -> list[list[Scalar]]:
+    """Trace A of the tool's twist at a pose in a working mode."""
+    return TwistTrace(machine.spec, machine.structure, pose, machine.trace_inverse(pose, mode)[0]).a
 
 
 def _bound_angle_sizes(limits: Sequence[Constraint]) -> list[tuple[str, Scalar]]:

@@ -20,7 +20,7 @@ from .plane_cuts import (
     find_redundant_leaves,
     keep_tightest_planes,
 )
-from .subdivision import Cells, Subdivision
+from .subdivision import OpenCells, Subdivision
 
 LOOKS = 4  # tries at narrowed orientations in a round
 MOST = 128  # boxes of orientations that a cell may have
@@ -51,7 +51,7 @@ class InclusiveSubdivision(Subdivision):
     def _list_boxes(self, cell: Indices, low: Array, high: Array) -> list[OrientationBoxes]:
         return [OrientationBoxes(cell, low, high, np.ones((len(cell), len(self.constraints)), np.bool_))]
 
-    def _examine(self, low: Array, size: Array, boxes: list[OrientationBoxes]) -> tuple[Cells, list[OrientationBoxes]]:
+    def _examine(self, low: Array, size: Array, boxes: list[OrientationBoxes]) -> OpenCells:
         (leaves,) = boxes
         finished: list[tuple[OrientationBoxes, CellFractions, Array]] = []
         inside, count = np.zeros(len(low), np.bool_), np.zeros(len(low), np.int64)

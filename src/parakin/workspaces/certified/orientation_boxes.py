@@ -19,6 +19,7 @@ from .plane_cuts import (
     TaylorBounds,
     accumulate_cuts,
     bound_linearly,
+    join_boxes,
     take_rows,
 )
 from .sign_proofs import FormPlanes
@@ -41,15 +42,6 @@ class OrientationBoxes:
         """Keep some of the boxes."""
         return OrientationBoxes(*take_rows((self.cell, self.low, self.high, self.needs), which))
 
-    def renumber(self, new: Indices) -> OrientationBoxes:
-        """Renumber the cells; the boxes of cells without a number (-1) are dropped."""
-        kept = self.take(new[self.cell] >= 0)
-        return replace(kept, cell=new[kept.cell])
-
-    def shift(self, offset: int) -> OrientationBoxes:
-        """Add an offset to the cells' numbers."""
-        return replace(self, cell=self.cell + offset)
-
     def repeat_for_children(self, count: int) -> OrientationBoxes:
         """Repeat the boxes for each of the ``count`` children of their cells."""
         cell = (self.cell[:, None] * count + np.arange(count)).reshape(-1)
@@ -58,8 +50,51 @@ class OrientationBoxes:
 
 def concatenate_boxes(groups: Sequence[OrientationBoxes]) -> OrientationBoxes:
     """Put boxes of orientations together."""
+    if not groups:
+        none = np.zeros((0, 0))
+        return OrientationBoxes(np.zeros(0, np.int64), none, none, np.zeros((0, 0), np.bool_))
     names = ("cell", "low", "high", "needs")
     return OrientationBoxes(*(np.concatenate([getattr(group, name) for group in groups]) for name in names))
+
+
+@dataclass(frozen=True, eq=False)
+class BoxLists:
+    """Lists of boxes of orientations, one after the other in ``boxes``; ``counts`` tells how many each has."""
+
+    boxes: OrientationBoxes
+    counts: Indices
+
+    @classmethod
+    def join(cls, lists: Sequence[OrientationBoxes]) -> BoxLists:
+        """Put lists one after the other."""
+        return cls(concatenate_boxes(lists), np.array([len(boxes.cell) for boxes in lists], np.int64))
+
+    def split(self) -> list[OrientationBoxes]:
+        """Return each list by itself."""
+        parts = [slice(stop - count, stop) for stop, count in zip(np.cumsum(self.counts), self.counts, strict=True)]
+        boxes = self.boxes
+        return [OrientationBoxes(boxes.cell[p], boxes.low[p], boxes.high[p], boxes.needs[p]) for p in parts]
+
+    def renumber(self, new: Indices) -> BoxLists:
+        """Renumber the cells; the boxes of cells without a number (-1) are dropped."""
+        cell = new[self.boxes.cell]
+        kept = cell >= 0
+        before = np.append(0, np.cumsum(kept))[np.append(0, np.cumsum(self.counts))]
+        return BoxLists(replace(self.boxes.take(kept), cell=cell[kept]), np.diff(before))
+
+    def repeat_for_children(self, count: int) -> BoxLists:
+        """Repeat the boxes for each of the ``count`` children of their cells."""
+        return BoxLists(self.boxes.repeat_for_children(count), self.counts * count)
+
+    def shift(self, offset: int) -> BoxLists:
+        """Add an offset to the cells' numbers."""
+        return replace(self, boxes=replace(self.boxes, cell=self.boxes.cell + offset))
+
+
+def concatenate_lists(groups: Sequence[BoxLists]) -> BoxLists:
+    """Put together the first lists of all groups, then the second ones, and so on."""
+    lists = [boxes for same in zip(*(group.split() for group in groups), strict=True) for boxes in same]
+    return BoxLists(concatenate_boxes(lists), np.sum([group.counts for group in groups], 0))
 
 
 def bisect_boxes(boxes: OrientationBoxes, which: Flags, spread: Array) -> OrientationBoxes:
@@ -80,9 +115,10 @@ def bound_margin(constraint: Constraint, low: Array, size: Array, boxes: Orienta
     every : the margin must be kept at every orientation of a box, else at one
     """
     n, d, s = len(boxes.cell), low.shape[1], boxes.low.shape[1]
-    bottom, top = _join_boxes(low, size, boxes)
-    middle = 0.5 * (bottom + top)
-    half = np.maximum(middle - bottom, top - middle)
+    if not n:
+        return LinearBounds.allocate(n, d, s)
+    bottom, top, middle, half = (np.empty((n, d + s)) for _ in range(4))
+    join_boxes(low, size, boxes.cell, boxes.low, boxes.high, bottom, top, middle, half)
     over_box = constraint.box_program(bottom, top)
     in_middle = constraint.point_program(middle, middle)
     given = TaylorBounds(constraint.is_smooth, *over_box, *in_middle, half)
@@ -91,10 +127,21 @@ def bound_margin(constraint: Constraint, low: Array, size: Array, boxes: Orienta
     return result
 
 
-def _join_boxes(low: Array, size: Array, boxes: OrientationBoxes) -> tuple[Array, Array]:
-    """Join cells and their boxes of orientations to boxes of both, (N, d + s)."""
+def _list_corners(low: Array, size: Array, boxes: OrientationBoxes) -> tuple[Array, Array]:
+    """List the ends of the boxes of positions and orientations, (N, d + s) each."""
     corner = low[boxes.cell]
     return np.concatenate([corner, boxes.low], 1), np.concatenate([corner + size[boxes.cell], boxes.high], 1)
+
+
+def decide_signs(
+    constraint: Constraint, low: Array, size: Array, boxes: OrientationBoxes, outside: Flags
+) -> OrientationBoxes:
+    """Decide boxes by the constraint's sign proof; returns the others, and marks cells ``outside`` that it excludes."""
+    if constraint.sign is None or not len(boxes.cell):
+        return boxes
+    sign = constraint.sign(*_list_corners(low, size, boxes)).sign
+    outside[boxes.cell[sign < 0.0]] = True
+    return boxes.take(sign == 0.0)
 
 
 def prove_signs(
@@ -108,7 +155,7 @@ def prove_signs(
     rows = np.flatnonzero(which)
     if constraint.sign is None or not len(rows):
         return
-    sign, shares, planes = constraint.sign(*_join_boxes(low, size, boxes.take(rows)))
+    sign, shares, planes = constraint.sign(*_list_corners(low, size, boxes.take(rows)))
     bounds.state[rows] = np.where(sign > 0.0, CLEARED, np.where(sign < 0.0, EXCLUDED, bounds.state[rows]))
     if planes is not None:
         _take_closer_planes(bounds, rows, planes)

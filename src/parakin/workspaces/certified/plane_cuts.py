@@ -155,32 +155,64 @@ def _compute_fraction(b, w, n):
 
 
 @njit(nogil=True, cache=True)
-def bound_fraction(b, slopes, scratch):
-    """Bound the fraction of a box above b + slopes·v ≥ 0, v in [-1, 1]^d, rounding included: (least, greatest).
+def _scale_slopes(slopes, scaled):
+    """Scale slopes by the steepest: fill in those that are not flat.
 
-    ``scratch`` (3,) is overwritten.
+    Returns how many they are, the sum of the flat ones, the steepest slope and the sum of all, both as given.
     """
     steepest, total = 0.0, 0.0
     for slope in slopes:
         steepest = max(steepest, abs(slope))
         total += abs(slope)
+    n, flat = 0, 0.0
+    for slope in slopes:
+        if abs(slope) > _FLAT * steepest:
+            scaled[n] = abs(slope) / steepest
+            n += 1
+        elif steepest > 0.0:
+            flat += abs(slope) / steepest
+    return n, flat, steepest, total
+
+
+@njit(nogil=True, cache=True)
+def _bound_scaled_fraction(b, scaled, scale):
+    """Bound the fraction of a box above b + slopes·v ≥ 0 by the slopes as :func:`_scale_slopes` scaled them."""
+    n, flat, steepest, total = scale
     if b >= total:
         return 1.0, 1.0
     if b < -total:
         return 0.0, 0.0
     if b != b:
         return 0.0, 1.0
-    n, flat = 0, 0.0
-    for slope in slopes:
-        if abs(slope) > _FLAT * steepest:
-            scratch[n] = abs(slope) / steepest
-            n += 1
-        else:
-            flat += abs(slope) / steepest
     # A part that rounds to all or to nothing is neither: what is cut off at a corner can be smaller than a rounding.
-    least = max(0.0, _compute_fraction(b / steepest - flat, scratch, n) - _ROUNDING)
-    most = min(1.0, _compute_fraction(b / steepest + flat, scratch, n) + _ROUNDING)
-    return least, most
+    least = _compute_fraction(b / steepest - flat, scaled, n)
+    most = _compute_fraction(b / steepest + flat, scaled, n) if flat > 0.0 else least
+    return max(0.0, least - _ROUNDING), min(1.0, most + _ROUNDING)
+
+
+@njit(nogil=True, cache=True)
+def bound_fraction(b, slopes, scratch):
+    """Bound the fraction of a box above b + slopes·v ≥ 0, v in [-1, 1]^d, rounding included: (least, greatest).
+
+    ``scratch`` (3,) is overwritten.
+    """
+    return _bound_scaled_fraction(b, scratch, _scale_slopes(slopes, scratch))
+
+
+@njit(nogil=True, cache=True)
+def join_boxes(low, size, cell, first, last, bottom, top, middle, half):
+    """Join cells and boxes of orientations in them to boxes of both, with their middles and half widths.
+
+    low, size : (cells, d); cell : (N,) of each box; first, last : (N, s) the ends of its orientations
+    bottom, top, middle, half : (N, d + s), filled
+    """
+    d, s = low.shape[1], first.shape[1]
+    for i in range(len(cell)):
+        c = cell[i]
+        for k in range(d + s):
+            a, b = (low[c, k], low[c, k] + size[c, k]) if k < d else (first[i, k - d], last[i, k - d])
+            m = 0.5 * (a + b)
+            bottom[i, k], top[i, k], middle[i, k], half[i, k] = a, b, m, max(m - a, b - m)
 
 
 @njit(nogil=True, cache=True, inline="always")
@@ -289,7 +321,7 @@ def accumulate_cuts(bounds, number, cell, half, cuts, start, stop):
     outer, cut_off, cut_off_estimate = cuts.outer, cuts.cut_off, cuts.cut_off_estimate
     least_estimate, limit, area = cuts.least_estimate, cuts.limit, cuts.area
     d = slopes.shape[1]
-    scratch, merged = np.empty(3), np.empty(d)
+    scratch, scaled = np.empty(3), np.empty(3)
     while 0 < start < len(cell) and cell[start] == cell[start - 1]:  # a cell belongs to where its boxes begin
         start += 1
     i = start
@@ -302,37 +334,39 @@ def accumulate_cuts(bounds, number, cell, half, cuts, start, stop):
         for j in range(i, end):
             if low[j] < low[worst]:
                 worst = j
+        scale = _scale_slopes(slopes[worst], scaled)
         least, middle = low[worst], 0.5 * (low[worst] + high[worst])
+        outer[c] = min(outer[c], _bound_scaled_fraction(high[worst], scaled, scale)[1])
         for j in range(i, end):
+            if j == worst:
+                continue
             shift = 0.0
             for k in range(d):
                 shift += abs(slopes[j, k] - slopes[worst, k])
             least = min(least, low[j] - shift)
             outer[c] = min(outer[c], bound_fraction(high[j], slopes[j], scratch)[1])
-        merged[:] = slopes[worst]
-        cut_off[c] += 1.0 - bound_fraction(least, merged, scratch)[0]
-        ends = bound_fraction(middle, merged, scratch)
+        cut_off[c] += 1.0 - _bound_scaled_fraction(least, scaled, scale)[0]
+        ends = _bound_scaled_fraction(middle, scaled, scale)
         estimate = 0.5 * (ends[0] + ends[1])
         cut_off_estimate[c] += 1.0 - estimate
         if estimate < least_estimate[c]:
             least_estimate[c] = estimate
             limit[c] = number
-            area[c] = _estimate_area(middle, merged, half[c], scratch)
+            gradient = 0.0
+            for k in range(d):
+                gradient += (slopes[worst, k] / half[c, k]) ** 2
+            area[c] = _estimate_area(middle, scaled, scale) * np.sqrt(gradient)
         i = end
 
 
 @njit(nogil=True, cache=True)
-def _estimate_area(b, slopes, half, scratch):
-    """Estimate the area of the plane b + slopes·v = 0 in a box of half widths, per unit of its volume."""
-    steep, gradient = 0.0, 0.0
-    for k in range(len(slopes)):
-        steep += abs(slopes[k])
-        gradient += (slopes[k] / half[k]) ** 2
-    step = 1e-3 * steep
+def _estimate_area(b, scaled, scale):
+    """Estimate how fast the fraction of a box above b + slopes·v = 0 grows with b."""
+    step = 1e-3 * scale[3]
     if not step > 0.0:
         return 0.0
-    more, less = bound_fraction(b + step, slopes, scratch)[0], bound_fraction(b - step, slopes, scratch)[0]
-    return (more - less) / (2.0 * step) * np.sqrt(gradient)
+    more, less = _bound_scaled_fraction(b + step, scaled, scale)[0], _bound_scaled_fraction(b - step, scaled, scale)[0]
+    return (more - less) / (2.0 * step)
 
 
 @njit(nogil=True, cache=True)

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from itertools import product
-
 import numpy as np
 
-from ...arrays import Array, Flags, Indices
+from ...arrays import Array, Flags
+from ...kernels.compiling import njit
 from .subdivision import Cells
 
 _LONGEST = {1: 4096, 2: 512, 3: 64}  # voxels along the longest edge, by dimension
+_SLACK = 1e-9  # of a voxel, by which cells reach into the next one
+_EMPTY, _OCCUPIED, _FLOODED = range(3)
 
 
 def find_joined_cells(cells: Cells, position: Array) -> Flags | None:
@@ -20,44 +21,58 @@ def find_joined_cells(cells: Cells, position: Array) -> Flags | None:
     """
     if not len(cells.low):
         return None
-    top = cells.low + cells.size
-    if not ((cells.low <= position) & (position <= top)).all(1).any():
+    low, high = cells.corners
+    d, voxel = len(low), float((high - low).max()) / _LONGEST[len(low)]
+    image = np.zeros([int(edge / voxel + _SLACK) + 1 for edge in high - low] + [1] * (3 - d), np.int8)
+    first = np.zeros((len(cells.low), 3), np.int32)
+    if not _paint_boxes((cells.low - low) / voxel, cells.size / voxel, (position - low) / voxel, first, image):
         return None
-    d, origin = cells.low.shape[1], cells.low.min(0)
-    voxel = float((top.max(0) - origin).max()) / _LONGEST[d]
-    first = np.floor((cells.low - origin) / voxel - 1e-9).astype(np.int64).clip(0)
-    last = np.floor((top - origin) / voxel + 1e-9).astype(np.int64)
-    occupied = _paint_ranges(first, last)
-    flooded = np.zeros_like(occupied)
-    flooded[tuple(np.floor((position - origin) / voxel).astype(np.int64).clip(0))] = True
-    flooded &= occupied
-    count = 0
-    while count != (count := int(flooded.sum())):
-        flooded = _expand_image(flooded) & occupied
-    return np.asarray(flooded[tuple(first.T)])
+    start = np.zeros(3, np.int64)
+    start[:d] = np.floor((position - low) / voxel).clip(0)
+    _flood(image, start)
+    return np.asarray(image[tuple(first.T)] == _FLOODED)
 
 
-def _paint_ranges(first: Indices, last: Indices) -> Flags:
-    """Paint boxes of voxels, each from its first to its last one: sums of differences at their corners."""
-    d = first.shape[1]
-    shape = tuple(last.max(0) + 2)
-    sums = np.zeros(shape, np.int64)
-    for corner in product((0, 1), repeat=d):
-        index = [(last[:, k] + 1) if above else first[:, k] for k, above in enumerate(corner)]
-        counts = np.bincount(np.ravel_multi_index(index, shape), minlength=sums.size)
-        sums += (-1) ** sum(corner) * counts.reshape(shape)
-    for axis in range(d):
-        sums = sums.cumsum(axis)
-    return np.asarray(sums > 0)
+@njit(nogil=True, cache=True)
+def _paint_boxes(low, size, position, first, image):
+    """Paint boxes into an image of unit voxels; returns whether the position is in one of them.
+
+    low, size : (N, d); position : (d,)
+    first : (N, 3) filled with each box's first voxel
+    image : of three dimensions, some of length 1
+    """
+    d = low.shape[1]
+    last = np.zeros(3, np.int64)
+    found = False
+    for i in range(len(low)):
+        holds = True
+        for k in range(d):
+            top = low[i, k] + size[i, k]
+            first[i, k] = max(int(np.floor(low[i, k] - _SLACK)), 0)
+            last[k] = min(int(np.floor(top + _SLACK)), image.shape[k] - 1)
+            holds &= (low[i, k] - _SLACK <= position[k]) & (position[k] <= top + _SLACK)
+        found |= holds
+        for x in range(first[i, 0], last[0] + 1):
+            for y in range(first[i, 1], last[1] + 1):
+                for z in range(first[i, 2], last[2] + 1):
+                    image[x, y, z] = _OCCUPIED
+    return found
 
 
-def _expand_image(image: Flags) -> Flags:
-    """Add to an image all voxels that touch it."""
-    for axis in range(image.ndim):
-        wider = image.copy()
-        ahead, behind = [slice(None)] * image.ndim, [slice(None)] * image.ndim
-        ahead[axis], behind[axis] = slice(1, None), slice(None, -1)
-        wider[tuple(ahead)] |= image[tuple(behind)]
-        wider[tuple(behind)] |= image[tuple(ahead)]
-        image = wider
-    return image
+@njit(nogil=True, cache=True)
+def _flood(image, start):
+    """Flood the occupied voxels that hang together with one voxel, also across edges and corners."""
+    stack = np.empty((image.size, 3), np.int16)
+    stack[0] = start
+    image[start[0], start[1], start[2]] = _FLOODED
+    count = 1
+    while count:
+        count -= 1
+        x, y, z = stack[count]
+        for i in range(max(x - 1, 0), min(x + 2, image.shape[0])):
+            for j in range(max(y - 1, 0), min(y + 2, image.shape[1])):
+                for k in range(max(z - 1, 0), min(z + 2, image.shape[2])):
+                    if image[i, j, k] == _OCCUPIED:
+                        image[i, j, k] = _FLOODED
+                        stack[count] = i, j, k
+                        count += 1

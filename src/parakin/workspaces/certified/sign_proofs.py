@@ -66,6 +66,19 @@ def make_margin_proof(margin: Scalar, inputs: Sequence[Term]) -> SignProof:
     return prove
 
 
+def make_opposite_proof(prove: SignProof) -> SignProof:
+    """Make the proof for the margin of the opposite sign."""
+
+    def prove_opposite(low: Array, high: Array) -> ProvedSigns:
+        proved = prove(low, high)
+        planes = proved.planes
+        if planes is not None:
+            planes = FormPlanes(-planes.slopes, -planes.high, -planes.low)
+        return ProvedSigns(-proved.sign, proved.spread, planes)
+
+    return prove_opposite
+
+
 def make_side_proof(rows: Sequence[Sequence[Scalar]], side: float, inputs: Sequence[Term]) -> SignProof:
     """Make the proof that a determinant has the sign of ``side`` all over a box, by the matrices' regularity."""
     bounds = MatrixBounds(rows, inputs, inputs[0].trace)

@@ -12,7 +12,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, reduce
-from itertools import product
+from itertools import pairwise, product
 from math import inf
 from typing import Any
 
@@ -21,7 +21,7 @@ import numpy as np
 from ...arrays import Array, Flags, Indices, Progress
 from ...budget import Budget
 from .constraints import Constraint
-from .orientation_boxes import OrientationBoxes, concatenate_boxes
+from .orientation_boxes import BoxLists, OrientationBoxes, concatenate_lists
 from .plane_cuts import CellFractions, take_rows
 
 FIRST = 8  # cells along the longest side of the first box
@@ -91,6 +91,10 @@ class Cells:
         high = [column.max(initial=-inf) for column in (self.low + self.size).T]
         return np.array(low), np.array(high)
 
+    @cached_property
+    def undecided_volumes(self) -> Array:
+        return np.asarray((self.outer - self.inner) * self.volumes)
+
     def take(self, which: Flags | Indices) -> Cells:
         """Keep some of the cells.
 
@@ -130,6 +134,32 @@ def make_empty_cells(dimension: int) -> Cells:
     return Cells(np.zeros((0, dimension)), np.zeros((0, dimension)), none, none, none, np.zeros(0, np.int64), none)
 
 
+@dataclass(frozen=True, eq=False)
+class OpenCells:
+    """Undecided cells, and lists of what is still to be proved of them."""
+
+    cells: Cells
+    boxes: BoxLists
+
+    def __len__(self) -> int:
+        return len(self.cells.low)
+
+    def take(self, which: Indices) -> OpenCells:
+        """Keep some of the cells, each once."""
+        new = np.full(len(self), -1)
+        new[which] = np.arange(len(which))
+        return OpenCells(self.cells.take(which), self.boxes.renumber(new))
+
+
+def concatenate_open_cells(groups: Sequence[OpenCells]) -> OpenCells:
+    """Put groups of open cells together."""
+    if len(groups) == 1:
+        return groups[0]
+    offsets = np.cumsum([0, *map(len, groups)]).tolist()
+    lists = [group.boxes.shift(offset) for group, offset in zip(groups, offsets, strict=False)]
+    return OpenCells(concatenate_cells([group.cells for group in groups]), concatenate_lists(lists))
+
+
 class Subdivision(ABC):
     """The subdivision of a box of positions under constraints; :meth:`run` refines it until a condition stops it.
 
@@ -137,8 +167,7 @@ class Subdivision(ABC):
     low, high : the box's corners, (d,) mm
     orientations : low and high of the swept axes, (s,) rad each
     closely : whether signs are proved where bounds don't tell them; it is of no use in cells larger than the machine
-    open_cells : undecided cells
-    open_boxes : lists of what is still to be proved of them
+    open_groups : undecided cells, those of each round together, so that a round copies only what it cuts
     """
 
     def __init__(
@@ -161,8 +190,7 @@ class Subdivision(ABC):
         began = time.monotonic()
         bottom, top = (np.broadcast_to(end, (len(index), len(end))) for end in orientations)
         boxes = self._list_boxes(np.arange(len(index)), bottom, top)
-        cells, boxes = self._examine(low + index * size, np.tile(size, (len(index), 1)), boxes)
-        self.open_cells, self.open_boxes = cells, boxes
+        self.open_groups = [self._examine(low + index * size, np.tile(size, (len(index), 1)), boxes)]
         self.decided_cells = self._decided
         self._seconds_per_cell = (time.monotonic() - began + 1e-9) / len(index)  # of the last cells
 
@@ -171,15 +199,13 @@ class Subdivision(ABC):
         """List all there is to prove of the first cells, at orientations [low, high]."""
 
     @abstractmethod
-    def _examine(self, low: Array, size: Array, boxes: list[OrientationBoxes]) -> tuple[Cells, list[OrientationBoxes]]:
+    def _examine(self, low: Array, size: Array, boxes: list[OrientationBoxes]) -> OpenCells:
         """Bound the cells' fractions; store the cells that are decided inside and drop those outside.
 
         ``boxes`` is what was not proved of the cells they were cut from.
         """
 
-    def _sort_out(
-        self, low: Array, size: Array, fractions: CellFractions, boxes: list[OrientationBoxes]
-    ) -> tuple[Cells, list[OrientationBoxes]]:
+    def _sort_out(self, low: Array, size: Array, fractions: CellFractions, boxes: list[OrientationBoxes]) -> OpenCells:
         """Store the cells proved inside, drop those outside, and return the others."""
         estimate = np.clip(fractions.estimate, fractions.inner, fractions.outer)
         limit = np.where(fractions.inner >= 1.0, -1, fractions.limit)
@@ -187,10 +213,23 @@ class Subdivision(ABC):
         cells = Cells(low, size, fractions.inner, fractions.outer, estimate, limit, area)
         outside = fractions.outer <= 0.0
         self._decided.append(cells.take(~outside & (limit < 0)))
-        undecided = np.flatnonzero(~outside & (limit >= 0))
-        new = np.full(len(low), -1)
-        new[undecided] = np.arange(len(undecided))
-        return cells.take(undecided), [group.renumber(new) for group in boxes]
+        return OpenCells(cells, BoxLists.join(boxes)).take(np.flatnonzero(~outside & (limit >= 0)))
+
+    @property
+    def open_cells(self) -> Cells:
+        """All undecided cells."""
+        return concatenate_cells([group.cells for group in self.open_groups])
+
+    def _take_open_cells(self, which: Indices) -> OpenCells:
+        """Take some of the undecided cells, by their sorted indices among all of them."""
+        edges = np.cumsum([0, *map(len, self.open_groups)])
+        cuts = np.searchsorted(which, edges)
+        taken = [
+            group.take(which[a:b] - first)
+            for group, first, (a, b) in zip(self.open_groups, edges, pairwise(cuts), strict=False)
+            if b > a
+        ]
+        return concatenate_open_cells(taken or [self.open_groups[0].take(which)])
 
     def refine(self, parents: Indices, budget: Budget | None = None) -> None:
         """Divide open cells into 2^d children each, the first ones first, as many as the budget's time allows.
@@ -201,10 +240,10 @@ class Subdivision(ABC):
         Interrupted, it leaves the cells as they were.
         """
         self._decided, self.budget = [], budget
-        d = self.open_cells.low.shape[1]
+        d = self.open_groups[0].cells.low.shape[1]
         corners = np.array(list(product((0.0, 1.0), repeat=d)))
-        is_cut = np.zeros(len(self.open_cells.low), np.bool_)
-        examined: list[tuple[Cells, list[OrientationBoxes]]] = []
+        is_cut = np.zeros(sum(map(len, self.open_groups)), np.bool_)
+        examined: list[OpenCells] = []
         start = 0
         while start < len(parents):
             began = time.monotonic()
@@ -215,21 +254,17 @@ class Subdivision(ABC):
             batch = np.sort(parents[start : start + max(_FEW, count)])
             start += len(batch)
             is_cut[batch] = True
-            half = 0.5 * self.open_cells.size[batch]
-            low = (self.open_cells.low[batch][:, None] + corners * half[:, None]).reshape(-1, d)
-            new = np.full(len(is_cut), -1)
-            new[batch] = np.arange(len(batch))
-            children = [group.renumber(new).repeat_for_children(len(corners)) for group in self.open_boxes]
-            examined.append(self._examine(low, np.repeat(half, len(corners), 0), children))
+            cut = self._take_open_cells(batch)
+            half = 0.5 * cut.cells.size
+            low = (cut.cells.low[:, None] + corners * half[:, None]).reshape(-1, d)
+            boxes = cut.boxes.repeat_for_children(len(corners))
+            examined.append(self._examine(low, np.repeat(half, len(corners), 0), boxes.split()))
             self._seconds_per_cell = (time.monotonic() - began + 1e-9) / len(batch)
-        new = np.cumsum(~is_cut) - 1
-        new[is_cut] = -1
-        cells = [self.open_cells.take(~is_cut), *[group for group, _ in examined]]
-        offsets = np.cumsum([len(group.low) for group in cells])
-        lists = [[group.renumber(new) for group in self.open_boxes]]
-        lists += [[group.shift(n) for group in boxes] for n, (_, boxes) in zip(offsets, examined, strict=False)]
-        boxes, undecided = [concatenate_boxes(groups) for groups in zip(*lists, strict=True)], concatenate_cells(cells)
-        self.open_cells, self.open_boxes = undecided, boxes
+        groups = []
+        for group, cuts in zip(self.open_groups, _split_by_groups(is_cut, self.open_groups), strict=True):
+            rest = group.take(np.flatnonzero(~cuts)) if cuts.any() else group
+            groups += [rest] if len(rest) else []
+        self.open_groups = [*groups, concatenate_open_cells(examined)] if examined else groups or self.open_groups[:1]
         self.decided_cells = [*self.decided_cells, *self._decided]
         self.rounds += 1
 
@@ -242,7 +277,7 @@ class Subdivision(ABC):
 
     @property
     def _groups(self) -> list[Cells]:
-        return [*self.decided_cells, self.open_cells]
+        return [*self.decided_cells, *(group.cells for group in self.open_groups)]
 
     def tighten(self, fraction: float, budget: Budget | None = None) -> tuple[Array, Array] | None:
         """Refine the outermost cells until none is larger than a fraction of the box about all cells.
@@ -259,8 +294,10 @@ class Subdivision(ABC):
             if not (low <= high).all():
                 return None
             slack = 1e-9 * (high - low)
-            coarse = np.flatnonzero(self.open_cells.longest_edges > (high - low).max() * fraction)
-            bottom, top = self.open_cells.low[coarse], (self.open_cells.low + self.open_cells.size)[coarse]
+            edges = np.concatenate([group.cells.longest_edges for group in self.open_groups])
+            coarse = np.flatnonzero(edges > (high - low).max() * fraction)
+            bottom = np.concatenate([group.cells.low for group in self.open_groups])[coarse]
+            top = bottom + np.concatenate([group.cells.size for group in self.open_groups])[coarse]
             coarse = coarse[((bottom <= low + slack) | (top >= high - slack)).any(1)]
             if not len(coarse) or len(coarse) > OUTERMOST or (budget is not None and budget.is_spent()):
                 return low, high
@@ -302,21 +339,27 @@ class Subdivision(ABC):
 
         totals : of all cells
         """
-        open_cells = self.open_cells
-        large = open_cells.longest_edges > (self.finest if cell is None else max(cell * (1.0 + 1e-9), self.finest))
+        open_cells = [group.cells for group in self.open_groups]
+        edges = np.concatenate([cells.longest_edges for cells in open_cells])
+        large = edges > (self.finest if cell is None else max(cell * (1.0 + 1e-9), self.finest))
         if cell is None and compute_gap(totals) <= gap:
             return "gap", np.zeros(0, np.int64)
         if not large.any():
             return ("resolution" if cell is None else "cell"), np.zeros(0, np.int64)
-        if len(open_cells.low) > MOST or sum(len(group.cell) for group in self.open_boxes) > 4 * MOST:
+        if len(edges) > MOST or sum(group.boxes.counts.sum() for group in self.open_groups) > 4 * MOST:
             return "memory", np.zeros(0, np.int64)
-        undecided = np.where(large, (open_cells.outer - open_cells.inner) * open_cells.volumes, -1.0)
+        undecided = np.where(large, np.concatenate([cells.undecided_volumes for cells in open_cells]), -1.0)
         order = np.argsort(-undecided, kind="stable")
         order = order[: int(large.sum())]
         if cell is not None:
             return "", order
         rest = float(undecided[large].sum()) - np.cumsum(undecided[order])  # if all up to here were decided
         return "", order[: int(np.searchsorted(-rest, -0.5 * gap * totals[2])) + 1]
+
+
+def _split_by_groups(flags: Flags, groups: Sequence[OpenCells]) -> list[Flags]:
+    """Split flags of all cells into those of each group."""
+    return np.split(flags, np.cumsum([len(group) for group in groups])[:-1])
 
 
 def _snap_to_grid(low: Array, high: Array, counts: Indices) -> tuple[Array, Array]:

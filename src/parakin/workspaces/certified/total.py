@@ -18,10 +18,11 @@ from .orientation_boxes import (
     bisect_boxes,
     bound_margin,
     concatenate_boxes,
+    decide_signs,
     prove_signs,
 )
 from .plane_cuts import EXCLUDED, KEPT, LinearBounds, PlaneCuts
-from .subdivision import Cells, Subdivision
+from .subdivision import OpenCells, Subdivision
 
 LOOKS = 6  # tries at narrowed orientations in a round
 MOST = 32  # boxes of orientations that a constraint may have in a cell
@@ -37,7 +38,7 @@ class TotalSubdivision(Subdivision):
     def _list_boxes(self, cell: Indices, low: Array, high: Array) -> list[OrientationBoxes]:
         return [OrientationBoxes(cell, low, high, np.zeros((len(cell), 0), np.bool_))] * len(self.constraints)
 
-    def _examine(self, low: Array, size: Array, boxes: list[OrientationBoxes]) -> tuple[Cells, list[OrientationBoxes]]:
+    def _examine(self, low: Array, size: Array, boxes: list[OrientationBoxes]) -> OpenCells:
         cuts, outside = PlaneCuts.start(len(low)), np.zeros(len(low), np.bool_)
         open_boxes: list[OrientationBoxes] = []
         for number, (constraint, own) in enumerate(zip(self.constraints, boxes, strict=True)):
@@ -94,14 +95,15 @@ class TotalSubdivision(Subdivision):
         self, constraint: Constraint, low: Array, size: Array, boxes: OrientationBoxes, outside: Flags
     ) -> tuple[OrientationBoxes, LinearBounds]:
         """Bound a margin where there is one orientation, as :meth:`_bound_constraint`."""
-        if outside.any():
-            boxes = boxes.take(~outside[boxes.cell])
+        boxes = boxes.take(~outside[boxes.cell])
+        if self.closely and constraint.sign_first:
+            boxes = decide_signs(constraint, low, size, boxes, outside)
         bounds = bound_margin(constraint, low, size, boxes, every=True)
-        if self.closely:
+        if self.closely and not constraint.sign_first:
             prove_signs(constraint, low, size, boxes, bounds, bounds.state == KEPT)
         outside[boxes.cell[bounds.state == EXCLUDED]] = True
         kept = bounds.state == KEPT
-        return (boxes, bounds) if kept.all() else (boxes.take(kept), bounds.take(kept))
+        return boxes.take(kept), bounds.take(kept)
 
 
 def _narrow_boxes(boxes: OrientationBoxes, bounds: LinearBounds) -> OrientationBoxes:

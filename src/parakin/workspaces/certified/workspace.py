@@ -228,8 +228,7 @@ def measure_elsewhere(workspace: Workspace, gap: float = 0.05, seconds: float | 
         return workspace.apart
     if not everywhere.side_constraints:
         return workspace.apart
-    own = everywhere.side_constraints[0]
-    other = replace(own, margin=0.0 - own.margin)  # a singularity all over an orientation is no part of home's either
+    other = everywhere.side_constraints[0].negate()  # a singularity all over an orientation is no part of home's either
     cells = everywhere.subdivide(*extent, [other]).run(gap, budget=budget)
     beyond = _sum_volumes(cells)
     return Volume(*(a + b for a, b in zip(astuple(workspace.apart), astuple(beyond), strict=True)))

@@ -17,6 +17,7 @@ from parakin import algebra as alg
 from parakin.kernels.batch import evaluate_tape
 from parakin.kernels.tape import compile_tape
 from parakin.model.limits import compute_segment_distance
+from parakin.workspaces.certified.box_fractions import bound_fraction
 from parakin.workspaces.certified.constraints import Constraint
 from parakin.workspaces.certified.orientation_boxes import OrientationBoxes, add_cuts, bound_margin
 from parakin.workspaces.certified.plane_cuts import (
@@ -25,7 +26,6 @@ from parakin.workspaces.certified.plane_cuts import (
     KEPT,
     LinearBounds,
     PlaneCuts,
-    bound_fraction,
     bound_unions,
     keep_tightest_planes,
 )

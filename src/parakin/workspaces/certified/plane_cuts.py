@@ -17,9 +17,7 @@ from numpy.typing import NDArray
 
 from ...arrays import Array, Flags, Indices
 from ...kernels.compiling import njit
-
-_FLAT = 1e-4  # slopes below this fraction of the steepest count as unknown: the closed form cancels there
-_ROUNDING = 1e-7  # the error of the closed form, with slopes no flatter than that
+from .box_fractions import bound_fraction, bound_scaled_fraction, estimate_growth, scale_slopes
 
 KEPT, CLEARED, EXCLUDED = 0, 1, 2  # a margin over a box: undecided, kept everywhere, broken for every x
 
@@ -126,77 +124,6 @@ class PlaneCuts(NamedTuple):
     def fractions(self) -> CellFractions:
         estimate = 0.5 * (np.maximum(0.0, 1.0 - self.cut_off_estimate) + np.minimum(self.least_estimate, 1.0))
         return CellFractions(np.maximum(0.0, 1.0 - self.cut_off), self.outer, estimate, self.limit, self.area)
-
-
-@njit(nogil=True, cache=True)
-def _compute_fraction(b, w, n):
-    """Compute the fraction of the v in [-1, 1]^n with b + w·v ≥ 0, for n ≤ 3 positive w, by cutting off corners."""
-    total = 0.0
-    for k in range(n):
-        total += w[k]
-    if b >= total:
-        return 1.0
-    if b <= -total:
-        return 0.0
-    t = 0.5 * (total - abs(b))  # the smaller of both parts, at a corner
-    if n == 1:
-        fraction = t / w[0]
-    elif n == 2:
-        p, q = max(t - w[0], 0.0), max(t - w[1], 0.0)
-        fraction = (t * t - p * p - q * q) / (2.0 * w[0] * w[1])  # t ≤ (w0 + w1)/2: the far corner is not reached
-    else:
-        fraction = t * t * t
-        for k in range(3):
-            p = max(t - w[k], 0.0)
-            q = max(t - w[k] - w[(k + 1) % 3], 0.0)
-            fraction += q * q * q - p * p * p
-        fraction /= 6.0 * w[0] * w[1] * w[2]
-    return 1.0 - fraction if b > 0.0 else fraction
-
-
-@njit(nogil=True, cache=True)
-def _scale_slopes(slopes, scaled):
-    """Scale slopes by the steepest: fill in those that are not flat.
-
-    Returns how many they are, the sum of the flat ones, the steepest slope and the sum of all, both as given.
-    """
-    steepest, total = 0.0, 0.0
-    for slope in slopes:
-        steepest = max(steepest, abs(slope))
-        total += abs(slope)
-    n, flat = 0, 0.0
-    for slope in slopes:
-        if abs(slope) > _FLAT * steepest:
-            scaled[n] = abs(slope) / steepest
-            n += 1
-        elif steepest > 0.0:
-            flat += abs(slope) / steepest
-    return n, flat, steepest, total
-
-
-@njit(nogil=True, cache=True)
-def _bound_scaled_fraction(b, scaled, scale):
-    """Bound the fraction of a box above b + slopes·v ≥ 0 by the slopes as :func:`_scale_slopes` scaled them."""
-    n, flat, steepest, total = scale
-    if b >= total:
-        return 1.0, 1.0
-    if b < -total:
-        return 0.0, 0.0
-    if b != b:
-        return 0.0, 1.0
-    # A part that rounds to all or to nothing is neither: what is cut off at a corner can be smaller than a rounding.
-    least = _compute_fraction(b / steepest - flat, scaled, n)
-    most = _compute_fraction(b / steepest + flat, scaled, n) if flat > 0.0 else least
-    return max(0.0, least - _ROUNDING), min(1.0, most + _ROUNDING)
-
-
-@njit(nogil=True, cache=True)
-def bound_fraction(b, slopes, scratch):
-    """Bound the fraction of a box above b + slopes·v ≥ 0, v in [-1, 1]^d, rounding included: (least, greatest).
-
-    ``scratch`` (3,) is overwritten.
-    """
-    return _bound_scaled_fraction(b, scratch, _scale_slopes(slopes, scratch))
 
 
 @njit(nogil=True, cache=True)
@@ -334,9 +261,9 @@ def accumulate_cuts(bounds, number, cell, half, cuts, start, stop):
         for j in range(i, end):
             if low[j] < low[worst]:
                 worst = j
-        scale = _scale_slopes(slopes[worst], scaled)
+        scale = scale_slopes(slopes[worst], scaled)
         least, middle = low[worst], 0.5 * (low[worst] + high[worst])
-        outer[c] = min(outer[c], _bound_scaled_fraction(high[worst], scaled, scale)[1])
+        outer[c] = min(outer[c], bound_scaled_fraction(high[worst], scaled, scale)[1])
         for j in range(i, end):
             if j == worst:
                 continue
@@ -345,8 +272,8 @@ def accumulate_cuts(bounds, number, cell, half, cuts, start, stop):
                 shift += abs(slopes[j, k] - slopes[worst, k])
             least = min(least, low[j] - shift)
             outer[c] = min(outer[c], bound_fraction(high[j], slopes[j], scratch)[1])
-        cut_off[c] += 1.0 - _bound_scaled_fraction(least, scaled, scale)[0]
-        ends = _bound_scaled_fraction(middle, scaled, scale)
+        cut_off[c] += 1.0 - bound_scaled_fraction(least, scaled, scale)[0]
+        ends = bound_scaled_fraction(middle, scaled, scale)
         estimate = 0.5 * (ends[0] + ends[1])
         cut_off_estimate[c] += 1.0 - estimate
         if estimate < least_estimate[c]:
@@ -355,18 +282,8 @@ def accumulate_cuts(bounds, number, cell, half, cuts, start, stop):
             gradient = 0.0
             for k in range(d):
                 gradient += (slopes[worst, k] / half[c, k]) ** 2
-            area[c] = _estimate_area(middle, scaled, scale) * np.sqrt(gradient)
+            area[c] = estimate_growth(middle, scaled, scale) * np.sqrt(gradient)
         i = end
-
-
-@njit(nogil=True, cache=True)
-def _estimate_area(b, scaled, scale):
-    """Estimate how fast the fraction of a box above b + slopes·v = 0 grows with b."""
-    step = 1e-3 * scale[3]
-    if not step > 0.0:
-        return 0.0
-    more, less = _bound_scaled_fraction(b + step, scaled, scale)[0], _bound_scaled_fraction(b - step, scaled, scale)[0]
-    return (more - less) / (2.0 * step)
 
 
 @njit(nogil=True, cache=True)

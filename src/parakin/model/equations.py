@@ -21,7 +21,7 @@ from .limits import (
     list_strut_distances,
 )
 from .nominal_values import find_nominal_value
-from .rates import TwistRates, compute_twist_rates
+from .rates import TwistRates, TwistTrace, compute_twist_rates
 from .spec import Spec
 from .spheres import CENTRES_NEEDED, find_common_point, measure_side
 from .structures import PlatformPlacement, Structure, list_rods, locate_passive_rods, make_structure
@@ -273,6 +273,10 @@ class Equations:
     ) -> TwistRates:
         """Compute A and B of the tool's twist; see :func:`~.rates.compute_twist_rates`."""
         return compute_twist_rates(self.spec, self.structure, pose, joints, given)
+
+    def trace_twist_rows(self, pose: Sequence[Scalar], joints: Sequence[Scalar]) -> list[list[Scalar]]:
+        """Trace A of the tool's twist alone."""
+        return TwistTrace(self.spec, self.structure, pose, joints).a
 
     # Home.
 

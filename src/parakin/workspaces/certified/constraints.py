@@ -15,7 +15,6 @@ from ...arrays import Array
 from ...kernels.intervals import IntervalProgram, JumpFreeTrace
 from ...machine import Machine
 from ...model.equations import Equations
-from ...model.rates import TwistTrace
 from .sign_proofs import SignProof, make_margin_proof, make_opposite_proof
 from .strut_separation import make_separation_proof
 
@@ -212,7 +211,7 @@ class TracedPose:
 
 def trace_twist_rows(machine: Machine, pose: Sequence[Scalar], mode: str) -> list[list[Scalar]]:
     """Trace A of the tool's twist at a pose in a working mode."""
-    return TwistTrace(machine.spec, machine.structure, pose, machine.trace_inverse(pose, mode)[0]).a
+    return machine.trace_equations({}).trace_twist_rows(pose, machine.trace_inverse(pose, mode)[0])
 
 
 def _bound_angle_sizes(limits: Sequence[Constraint]) -> list[tuple[str, Scalar]]:

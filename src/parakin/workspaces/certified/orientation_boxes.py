@@ -14,6 +14,7 @@ from .constraints import Constraint
 from .plane_cuts import (
     CLEARED,
     EXCLUDED,
+    JoinedBoxes,
     LinearBounds,
     PlaneCuts,
     TaylorBounds,
@@ -71,9 +72,9 @@ class BoxLists:
 
     def split(self) -> list[OrientationBoxes]:
         """Return each list by itself."""
-        parts = [slice(stop - count, stop) for stop, count in zip(np.cumsum(self.counts), self.counts, strict=True)]
+        rows = [slice(stop - count, stop) for stop, count in zip(np.cumsum(self.counts), self.counts, strict=True)]
         boxes = self.boxes
-        return [OrientationBoxes(boxes.cell[p], boxes.low[p], boxes.high[p], boxes.needs[p]) for p in parts]
+        return [OrientationBoxes(boxes.cell[r], boxes.low[r], boxes.high[r], boxes.needs[r]) for r in rows]
 
     def renumber(self, new: Indices) -> BoxLists:
         """Renumber the cells; the boxes of cells without a number (-1) are dropped."""
@@ -117,11 +118,11 @@ def bound_margin(constraint: Constraint, low: Array, size: Array, boxes: Orienta
     n, d, s = len(boxes.cell), low.shape[1], boxes.low.shape[1]
     if not n:
         return LinearBounds.allocate(n, d, s)
-    bottom, top, middle, half = (np.empty((n, d + s)) for _ in range(4))
-    join_boxes(low, size, boxes.cell, boxes.low, boxes.high, bottom, top, middle, half)
-    over_box = constraint.box_program(bottom, top)
-    in_middle = constraint.point_program(middle, middle)
-    given = TaylorBounds(constraint.is_smooth, *over_box, *in_middle, half)
+    joined = JoinedBoxes(*(np.empty((n, d + s)) for _ in range(4)))
+    join_boxes(low, size, boxes.cell, boxes.low, boxes.high, joined)
+    over_box = constraint.box_program(joined.low, joined.high)
+    in_middle = constraint.point_program(joined.middle, joined.middle)
+    given = TaylorBounds(constraint.is_smooth, *over_box, *in_middle, joined.half)
     result = LinearBounds.allocate(n, d, s)
     run_in_threads(n, lambda start, stop: bound_linearly(given, every, result, start, stop))
     return result

@@ -46,6 +46,15 @@ class TaylorBounds(NamedTuple):
     half: Array
 
 
+class JoinedBoxes(NamedTuple):
+    """Boxes of positions and orientations: their ends, middles and half widths, (N, d + s) each."""
+
+    low: Array
+    high: Array
+    middle: Array
+    half: Array
+
+
 class LinearBounds(NamedTuple):
     """Linear bounds of one margin over N boxes (x, θ), and what they decide.
 
@@ -127,12 +136,13 @@ class PlaneCuts(NamedTuple):
 
 
 @njit(nogil=True, cache=True)
-def join_boxes(low, size, cell, first, last, bottom, top, middle, half):
-    """Join cells and boxes of orientations in them to boxes of both, with their middles and half widths.
+def join_boxes(low, size, cell, first, last, joined):
+    """Join cells and boxes of orientations in them to boxes of both.
 
     low, size : (cells, d); cell : (N,) of each box; first, last : (N, s) the ends of its orientations
-    bottom, top, middle, half : (N, d + s), filled
+    joined : :class:`JoinedBoxes`, filled
     """
+    bottom, top, middle, half = joined
     d, s = low.shape[1], first.shape[1]
     for i in range(len(cell)):
         c = cell[i]

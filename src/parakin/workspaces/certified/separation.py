@@ -29,7 +29,7 @@ def find_joined_cells(cells: Cells, position: Array) -> Flags | None:
         return None
     start = np.zeros(3, np.int64)
     start[:d] = np.floor((position - low) / voxel).clip(0)
-    _flood(image, start)
+    _fill_joined(image, start)
     return np.asarray(image[tuple(first.T)] == _FLOODED)
 
 
@@ -43,36 +43,37 @@ def _paint_boxes(low, size, position, first, image):
     """
     d = low.shape[1]
     last = np.zeros(3, np.int64)
-    found = False
+    is_inside = False
     for i in range(len(low)):
-        holds = True
+        is_own = True
         for k in range(d):
             top = low[i, k] + size[i, k]
             first[i, k] = max(int(np.floor(low[i, k] - _SLACK)), 0)
             last[k] = min(int(np.floor(top + _SLACK)), image.shape[k] - 1)
-            holds &= (low[i, k] - _SLACK <= position[k]) & (position[k] <= top + _SLACK)
-        found |= holds
+            is_own &= (low[i, k] - _SLACK <= position[k]) & (position[k] <= top + _SLACK)
+        is_inside |= is_own
         for x in range(first[i, 0], last[0] + 1):
             for y in range(first[i, 1], last[1] + 1):
                 for z in range(first[i, 2], last[2] + 1):
                     image[x, y, z] = _OCCUPIED
-    return found
+    return is_inside
 
 
 @njit(nogil=True, cache=True)
-def _flood(image, start):
-    """Flood the occupied voxels that hang together with one voxel, also across edges and corners."""
+def _fill_joined(image, start):
+    """Fill in the occupied voxels that hang together with one voxel, also across edges and corners."""
     stack = np.empty((image.size, 3), np.int16)
-    stack[0] = start
     image[start[0], start[1], start[2]] = _FLOODED
+    for k in range(3):
+        stack[0, k] = start[k]
     count = 1
     while count:
         count -= 1
-        x, y, z = stack[count]
+        x, y, z = stack[count, 0], stack[count, 1], stack[count, 2]
         for i in range(max(x - 1, 0), min(x + 2, image.shape[0])):
             for j in range(max(y - 1, 0), min(y + 2, image.shape[1])):
                 for k in range(max(z - 1, 0), min(z + 2, image.shape[2])):
                     if image[i, j, k] == _OCCUPIED:
                         image[i, j, k] = _FLOODED
-                        stack[count] = i, j, k
+                        stack[count, 0], stack[count, 1], stack[count, 2] = i, j, k
                         count += 1

@@ -224,12 +224,12 @@ class Subdivision(ABC):
         """Take some of the undecided cells, by their sorted indices among all of them."""
         edges = np.cumsum([0, *map(len, self.open_groups)])
         cuts = np.searchsorted(which, edges)
-        taken = [
+        groups = [
             group.take(which[a:b] - first)
             for group, first, (a, b) in zip(self.open_groups, edges, pairwise(cuts), strict=False)
             if b > a
         ]
-        return concatenate_open_cells(taken or [self.open_groups[0].take(which)])
+        return concatenate_open_cells(groups or [self.open_groups[0].take(which)])
 
     def refine(self, parents: Indices, budget: Budget | None = None) -> None:
         """Divide open cells into 2^d children each, the first ones first, as many as the budget's time allows.

@@ -13,7 +13,10 @@ _MOST_WORDS = 40  # of those that could be meant are told and compared
 
 
 class ParakinError(Exception):
-    """Anything parakin refuses; ``str()`` is one line fit for a terminal."""
+    """Anything parakin refuses; ``str()`` is one line fit for a terminal.
+
+    arguments : as of :class:`Exception`; texts are made printable, and long ones are cut in their middle
+    """
 
     def __init__(self, *arguments: object):
         super().__init__(
@@ -49,7 +52,10 @@ def _cut_middle(line: str) -> str:
 
 
 class InputErrors(InputError):
-    """Several input errors found in one pass; ``str()`` is one line each, of many the first ones."""
+    """Several input errors found in one pass; ``str()`` is one line each, of many the first ones.
+
+    errors : all of them, in the file's order
+    """
 
     def __init__(self, errors: list[InputError]):
         self.errors = errors
@@ -62,7 +68,11 @@ class InputErrors(InputError):
 
 
 class DescriptionError(ParakinError):
-    """A description that is well-formed but is no machine that works; ``key`` is the one at fault."""
+    """A description that is well-formed but is no machine that works.
+
+    key : the one at fault
+    message : what is wrong, one line
+    """
 
     def __init__(self, key: str, message: str):
         self.key = key

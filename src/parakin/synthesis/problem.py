@@ -198,7 +198,7 @@ class DesignProblem:
         try:
             return SizeBox(machine, self.within)
         except PoseError as error:
-            raise PoseError(f"within: {str(error).removeprefix('free: ')}") from None
+            raise PoseError(f"within: {error}") from None
 
     @cached_property
     def reserve(self) -> Reserve:

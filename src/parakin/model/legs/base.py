@@ -13,15 +13,23 @@ from ..elements import Drive, Point, Unit
 
 @dataclass(frozen=True)
 class Reach:
-    """A margin, mm², that is ≥ 0 where a leg reaches a point; of a rod its squared length less the squared distance."""
+    """A margin that is ≥ 0 where a leg reaches a point.
+
+    margin : mm²; of a rod its squared length less the squared distance
+    rod : its length, mm; 0 where the reach does not depend on one rod alone
+    """
 
     margin: Scalar
-    rod: float = 0.0  # mm; 0 where the reach does not depend on one rod alone
+    rod: float = 0.0
 
 
 @dataclass(frozen=True)
 class Inverse:
-    """A leg's joints for one platform point, and their reach, joint by joint."""
+    """A leg's joints for one platform point.
+
+    joints : mm and rad
+    reach : joint by joint
+    """
 
     joints: list[Scalar]
     reach: tuple[Reach, ...] = ()

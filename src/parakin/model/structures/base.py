@@ -25,20 +25,32 @@ LETTERS = {"tx": "X", "ty": "Y", "tz": "Z", "rx": "A", "ry": "B", "rz": "C"}
 
 @dataclass(frozen=True)
 class PlatformPlacement:
-    """Where a pose puts the platform, with the joints and coordinates that follow from it."""
+    """Where a pose puts the platform, with the joints and coordinates that follow from it.
+
+    rotation, origin : the platform's frame in the base frame, 3 rows of 3, and mm
+    coordinates : of the motion, mm and rad
+    serial : joints of head and table, mm and rad
+    reach : negative where head or table can't point the tool there
+    freedom : 0 where the first joint of head or table is free; None without two that turn
+    off_axis : the vector whose square that is
+    constraint_reach : without unit, negative where the constraints can't be kept
+    """
 
     rotation: Mat
     origin: Vec
-    coordinates: list[Scalar]  # of the motion
-    serial: list[Scalar]  # joints of head and table
-    reach: tuple[Scalar, ...] = ()  # negative where head or table can't point the tool there
-    freedom: Scalar | None = None  # 0 where the first joint of head or table is free
-    off_axis: Vec | None = None  # the vector whose square that is
-    constraint_reach: tuple[Scalar, ...] = ()  # without unit, negative where the constraints can't be kept
+    coordinates: list[Scalar]
+    serial: list[Scalar]
+    reach: tuple[Scalar, ...] = ()
+    freedom: Scalar | None = None
+    off_axis: Vec | None = None
+    constraint_reach: tuple[Scalar, ...] = ()
 
 
 class DirectionColumns(NamedTuple):
-    """The columns of B and C in a pose, side by side, where these two tell the tool's axis."""
+    """The columns of B and C in a pose, side by side, where these two tell the tool's axis.
+
+    b, c : their indices
+    """
 
     b: int
     c: int

@@ -19,7 +19,7 @@ html_static_path = ["static"]
 html_css_files = ["gallery.css"]
 autodoc_member_order = "bysource"
 autodoc_typehints = "none"  # the docstrings say it, with shapes and units
-autodoc_default_options = {"members": True, "undoc-members": True}
+autodoc_default_options = {"members": True}  # not fields: the docstring of their class describes them
 suppress_warnings = ["ref.python"]  # attributes of one name in several classes
 
 FIELD = re.compile(r"^([A-Za-z_][\w, ]*?) : (.*)")
@@ -27,7 +27,10 @@ UNDERLINE = re.compile(r"^-{3,}$")
 
 
 def write_fields_as_lists(app, what, name, obj, options, lines):
-    """Write a docstring's lines of names, ``name : what it is``, as a list, and its headings as rubrics."""
+    """Write a docstring's lines of names, ``name : what it is``, as a list, and its headings as rubrics.
+
+    All lists are of parameters or fields, so the heading that says so is left out.
+    """
     written = []
     for number, line in enumerate(lines):
         field = FIELD.match(line)
@@ -35,7 +38,7 @@ def write_fields_as_lists(app, what, name, obj, options, lines):
         if UNDERLINE.match(line):
             written.append("")
         elif UNDERLINE.match(following):
-            written += ["", f".. rubric:: {line}"]
+            written += ["", f".. rubric:: {line}"] if line != "Parameters" else []
         elif field:
             in_list = bool(written) and written[-1].startswith(("* ", "  "))
             written += [*([] if in_list else [""]), f"* ``{field[1]}``: {field[2]}"]
@@ -46,6 +49,11 @@ def write_fields_as_lists(app, what, name, obj, options, lines):
                 written.append("")
             written.append(line)
     lines[:] = [re.sub(r"\|(?=\w+ \w|\w+\|)", r"\\|", line) for line in written]
+
+
+def skip_tuple_fields(app, what, name, obj, skip, options):
+    """Leave out the fields of named tuples too, of which Python says their number only."""
+    return True if type(obj).__name__ == "_tuplegetter" else None
 
 
 def list_live_pages(app, docname, source):
@@ -71,5 +79,6 @@ def setup(app):
     """Connect what this page adds to Sphinx."""
     app.add_config_value("live_pages", True, "html")
     app.connect("autodoc-process-docstring", write_fields_as_lists)
+    app.connect("autodoc-skip-member", skip_tuple_fields)
     app.connect("source-read", list_live_pages)
     app.connect("build-finished", write_live_pages)

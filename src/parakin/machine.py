@@ -211,7 +211,7 @@ class Machine(MachineProperties, Displayed):
         return np.ascontiguousarray(wide.reshape(-1, len(self.axes)))
 
     def assemblies(self, joints: RowsLike) -> Assemblies:
-        """Find every real pose of one joint vector (joints,); see :class:`~.kinematics.assemblies.Assemblies`.
+        """Find every real pose of one joint vector (joints,); see :class:`parakin.Assemblies`.
 
         Raises :class:`NoMethodError` where the legs leave a continuum of poses.
         """

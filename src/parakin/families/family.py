@@ -125,19 +125,19 @@ def select_parameters(machine: Machine, patterns: Sequence[str], argument: str =
 class Family:
     """Machines that differ in some of their numbers; every call takes poses or joints, and sizes, of any batch.
 
-    Its methods share these arguments:
-
-    poses, joints, mode : as of :class:`Machine`
-    sizes : rows (..., k) of :attr:`names`, mm and rad, or a dict of some of them, the rest is :attr:`nominal`
-
-    Leading shapes broadcast. Nothing is traced or compiled for a machine of its own. Values of the wrong shape, kind or
-    name raise :class:`PoseError`.
-
     machine : whose numbers the others are
     parameters : the k numbers that are free
     names, nominal : their names, and their values in the machine, (k,) mm and rad
     added : a number that follows a free named size is what this makes it, and its own difference to its nominal value
         is added; otherwise a number that is free itself follows no size
+
+    Its methods share these arguments:
+
+    poses, joints, mode : as of :class:`Machine`
+    sizes : rows (..., k) of ``names``, mm and rad, or a dict of some of them, the rest is ``nominal``
+
+    Leading shapes broadcast. Nothing is traced or compiled for a machine of its own. Values of the wrong shape, kind or
+    name raise :class:`PoseError`.
     """
 
     def __init__(self, machine: Machine, parameters: Sequence[Parameter], added: bool = False):
@@ -262,7 +262,7 @@ class Family:
         return self._keep(("check", mode, chosen), n, outputs)
 
     def base_joints(self, poses: RowsLike, sizes: RowsLike, mode: str | None = None) -> Array:
-        """Compute where the struts are joined to the base, -> (..., struts, 3), mm in the machine's frame."""
+        """Compute where struts are joined to the base, mm in its frame M: (..., axes), (..., k) -> (..., struts, 3)."""
         mode, (n, _) = self.machine.checked_mode(mode), self._counts
         lead, rows = self._rows([(poses, self.machine.axes, "poses")], sizes)
         tape = self._keep(("base joints", mode), n, lambda e, x: [c for foot in e.list_feet(x, mode) for c in foot])
@@ -315,11 +315,13 @@ class Family:
     def forward(
         self, joints: RowsLike, sizes: RowsLike, near: RowsLike | None = None, mode: str | None = None
     ) -> FamilySolution:
-        """Compute poses for joints by Newton's method, (..., joints) and (..., k) -> :class:`FamilySolution`.
+        """Compute poses for joints by Newton's method, (..., joints) and (..., k) -> (..., axes), with a verdict each.
 
-        near : poses (axes,) or (..., axes) to start from; by default home. The answer lies on the side of the parallel
-            singularities on which the start lies with the given joints and sizes, and in the working mode. With more
-            drives than freedoms it is that of least squares, whether or not the joints agree with these sizes.
+        near : poses (axes,) or (..., axes) to start from; by default home
+
+        The answer lies on the side of the parallel singularities on which the start lies with the given joints and
+        sizes, and in the working mode. With more drives than freedoms it is that of least squares, whether or not the
+        joints agree with these sizes.
         """
         machine, mode = self.machine, self.machine.checked_mode(mode)
         starts = machine.home if near is None else near

@@ -32,7 +32,7 @@ class Solution:
     residual : (...,) the greatest distance by which a leg fails to close there, mm
     converged : (...,) True where the legs close, in the working mode asked for and the start's assembly mode, or home's
     steps : (...,) Newton's steps; 0 in closed form
-    why : (...,) why there is no answer, an index of :data:`REASONS`; 0 where there is one
+    why : (...,) why there is no answer, by its number; 0 where there is one. :attr:`reasons` tells it in words
     in_other_mode : (...,) True where no mode was asked for and the legs stand in another one than the machine's, as the
         near pose tells
     """

@@ -47,7 +47,7 @@ class TravelEnd:
     distance : mm, rad, or multiples of the direction
     pose : (axes,) mm and rad, at its end
     limit : the limit that is broken next, ``singularity``, ``untold`` where it could not be told, or None where the way
-        goes on beyond :data:`FARTHEST`
+        goes on beyond 1e6 mm or 8π rad
     """
 
     distance: float

@@ -34,7 +34,7 @@ class CharacteristicLength:
 
 
 def choose_characteristic_length(machine: Machine, length: float | None = None) -> CharacteristicLength:
-    """Take ``length``, mm, if it is given, else the first of these rules that gives one.
+    """Take ``length``, mm, if it is given, else by the first of these rules that gives one for a ``machine``.
 
     - axes X Y Z B C: the tool's reach, from the head's last turn (without one from the platform) to the tip;
     - a platform that turns: the radius of its joints about their middle, root mean square;

@@ -31,7 +31,8 @@ _DEFICIENT = 1e-6  # rank deficiency of the residuals' derivative below which a 
 class Extreme:
     """The least or the greatest value of a quantity over the allowed positions.
 
-    quantity : one of :data:`MEASURES` (properties of :class:`Performance`) or a singularity margin's name
+    quantity : ``condition``, ``greatest``, ``least`` or ``manipulability``, as
+        :class:`parakin.performance.indices.Performance` has them, or a singularity margin's name
     side : ``min`` or ``max``
     value : in the quantity's unit
     pose : (axes,) mm and rad, that has it

@@ -62,9 +62,9 @@ def prepare_turned(
     corners: Corners = "round",
     progress: Progress | None = None,
 ) -> TurnedJob:
-    """Prepare a job as :func:`~.job.prepare` does, whose turn about the tool's axis is chosen along the whole path.
+    """Prepare a job as :func:`parakin.prepare` does, whose turn about the tool's axis is chosen along the whole path.
 
-    The turn is that of :func:`~.tool_turn.choice.choose_tool_turn`. The job with C as at home is prepared too, and
+    The turn is that of :func:`parakin.choose_tool_turn`. The job with C as at home is prepared too, and
     stays where it alone runs, or where the other leaves no more margin and takes no less time.
 
     machine, path, workpiece, mode : as for :func:`parakin.prepare`

@@ -30,13 +30,13 @@ NOT_COMPLETE = "not complete"
 class Assemblies:
     """Every real pose of one joint vector.
 
-    poses : (k, axes)
+    poses : (k, axes), mm and rad
     residuals : (k,) the greatest closure, mm
     radii : (k, 2) within what distance of its pose's the exact platform's origin lies, mm, and its turn, rad, by
         Krawczyk's test; NaN where there is no proof, as at a singularity, where two poses meet
     sides : (k,) the sign of det A, 0 at a singularity
     within_limits : (k,) where the pose keeps every limit
-    complete : :data:`CLOSED_FORM`, :data:`ALL_PATHS` of a homotopy, or :data:`NOT_COMPLETE`
+    complete : ``proved (closed form)``, ``all paths accounted for`` (of a homotopy), or ``not complete``
     complex_count : solutions that are not real; None of a closed form
     infinite_count : paths that ended at infinity; None of a closed form
     lost_count : paths that could not be followed, for these joints or for any, as of a platform that is nearly singular

@@ -42,7 +42,8 @@ _FEW, _ROUNDS = 30_000, 24  # undecided cells, and rounds, with which a proof th
 class RegionSingularity:
     """What is proved of one singularity margin over all positions of a region that the limits allow.
 
-    margin : its name, as in :func:`~..singularities.list_margin_names`
+    margin : its name: ``parallel``, ``serial JOINT`` of a leg's joint, ``serial JOINT-JOINT`` of head or table, or
+        ``constraint``
     verdict : ``met``, its sign changes among positions that hang together inside; ``none``, it is positive all over;
         ``unproved``, neither is proved, as where it only touches zero
     pose : (axes,) a pose where it is not above zero (where it only touches zero, at most 1 mm beside), of ``met`` alone

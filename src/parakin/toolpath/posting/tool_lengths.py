@@ -39,7 +39,7 @@ def fit_tool_lengths(
 
     Parameters
     ----------
-    machine : its :attr:`~.machine.Machine.tool_length` is what its kinematics has
+    machine : its :attr:`Machine.tool_length` is what its kinematics has
     path : as read; one that is fitted already is returned as it is
     length : mm of the longest tool, in place of the machine's own length; ``file``: all are as long as the file says;
         ``machine``: all are as long as the machine's own; None: see below

@@ -37,8 +37,8 @@ _SHRINKING = 0.6  # ratio of a cell's edge to that of the round before, while ce
 class Region:
     """A set of tool positions: those where the machine is allowed at every or at one orientation of given ranges.
 
-    Made by :func:`make_region`. The total orientation workspace is the set of X, Y, Z at which (44) of FME Transactions
-    41 (2013) is 1 for every B and C of the ranges.
+    Made by :func:`parakin.region`. The total orientation workspace is the set of X, Y, Z at which (44) of FME
+    Transactions 41 (2013) is 1 for every B and C of the ranges.
 
     machine, mode : the one that is asked about, and its working mode
     kind : constant (one orientation), total (every one of the ranges), inclusive (at least one), dexterous (every one)
@@ -115,7 +115,7 @@ class Region:
 
     @property
     def parameters(self) -> dict[str, Any]:
-        """What :func:`make_region` needs to make the same region of the same machine, and what follows; mm and rad."""
+        """What :func:`parakin.region` needs to make the region again, and what follows from it; mm and rad."""
         swept = {axis: list(ends) for axis, ends in self.swept_axes.items()}
         return {
             "machine": self.machine.name,

@@ -33,7 +33,7 @@ class GridWorkspace(SampledWorkspace):
 
     coordinates : of the cells' middles along each axis, mm
     broken : (n, ...) as many axes as coordinates, 0 where the position is allowed, else 1 + the index in
-        ``region.limits`` of the first limit broken, as :class:`BrokenLimitFinder` finds it
+        ``region.limits`` of the first limit broken
     """
 
     coordinates: tuple[Array, ...]

@@ -89,7 +89,7 @@ def sweep_polar(
     planes : distance of the planes, mm; ``step`` by default. They stand at odd multiples of half of it
     rays : how many in a plane
     axis : the two coordinates of the axis, mm; home's by default
-    turns_step : as in :func:`parakin.workspaces.sampled.grid.sample_grid`
+    turns_step : as for :func:`parakin.sample_grid`
     progress : called with the fraction done
     seconds : the time in which all must be sampled; None for no end
 

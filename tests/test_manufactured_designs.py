@@ -178,7 +178,7 @@ def test_the_command_tells_of_which_machines(capsys, tmp_path):
         ({"foots": "0.1 mm"}, 'within: tolerance foots: unknown "foots"'),
         ({"rods": "0.1"}, 'within: tolerance rods: "0.1" needs a unit'),
         ({"rods": "1 deg"}, "within: tolerance rods: legs.rho_x.rod is a length"),
-        ({}, "within: at least one expected"),
+        ({}, "within: tolerances: at least one expected"),
     ],
 )
 def test_bad_tolerances_are_refused(within, message):

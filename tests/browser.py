@@ -43,3 +43,40 @@ def wait_until(tab, expression, seconds=20.0):
     while not tab.evaluate(expression):
         assert time.monotonic() < end, expression
         tab.wait_for_timeout(30)
+
+
+PALE_TEXTS = r"""least => {
+  const read = text => {
+    const numbers = text.match(/[\d.]+(e-?\d+)?/g).map(Number), unit = text.startsWith("color(") ? 255 : 1;
+    return [...numbers.slice(0, 3).map(x => unit * x), numbers[3] ?? 1];
+  };
+  const lay = (over, under) => under.map((x, i) => i < 3 ? over[3] * over[i] + (1 - over[3]) * x : 1);
+  const listGrounds = one => {
+    if (!one) return [[255, 255, 255, 1]];
+    const {backgroundColor, backgroundImage} = getComputedStyle(one);
+    const stops = backgroundImage.match(/rgba?\([^)]*\)|color\([^)]*\)/g) || [backgroundColor];
+    return listGrounds(one.parentElement).flatMap(under => stops.map(stop => lay(read(stop), under)));
+  };
+  const light = x => x / 255 <= 0.04045 ? x / 255 / 12.92 : ((x / 255 + 0.055) / 1.055) ** 2.4;
+  const brightness = colour => 0.2126 * light(colour[0]) + 0.7152 * light(colour[1]) + 0.0722 * light(colour[2]);
+  const measure = (one, part) => Math.min(...listGrounds(one).map(ground => {
+    const [low, high] = [ground, lay(read(getComputedStyle(one, part).color), ground)].map(brightness).sort((a, b) => a - b);
+    return (high + 0.05) / (low + 0.05);
+  }));
+  for (const details of document.querySelectorAll("details")) details.open = true;
+  const found = [];
+  for (const one of document.body.querySelectorAll("*")) {
+    const says = [...one.childNodes].some(node => node.nodeType === 3 && node.data.trim()) || one.matches("input, select, textarea");
+    if (!says || one.matches("script, style, option, [type=range], [type=checkbox]") || !one.checkVisibility({visibilityProperty: true})) continue;
+    for (const part of one.placeholder ? [null, "::placeholder"] : [null]) {
+      const contrast = measure(one, part);
+      if (!(contrast >= least)) found.push(`${one.tagName} #${one.id} .${one.className} ${part || ""} "${one.textContent.slice(0, 30)}": ${contrast.toFixed(2)}`);
+    }
+  }
+  return found;
+}"""
+
+
+def list_pale_texts(tab):
+    """List the texts of a page, closed ones too, whose contrast by WCAG 2 is below 4.5, by their colours in CSS."""
+    return tab.evaluate(PALE_TEXTS, 4.5)

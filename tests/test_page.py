@@ -9,7 +9,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from browser import needs_chromium, open_browser, open_tab, wait_until
+from browser import list_pale_texts, needs_chromium, open_browser, open_tab, wait_until
 from dense_deviations import axis_of, path_of
 from shipped import NAMES, REPRESENTATIVES, load_shipped
 
@@ -338,6 +338,8 @@ def test_a_part_is_played(tmp_path, browser):
         tab.get_by_role("button", name="Pause").click()
         for colours in ("feed", "pace", "motion", "margin"):
             tab.locator("#colours").select_option(colours)
+            tab.click("#theme")
+            assert not list_pale_texts(tab)
         tab.get_by_role("button", name="Path", exact=True).click()
         assert "mm/min" in tab.locator("#clock").inner_text()
         tab.locator("#curves").click(position={"x": 10, "y": 40})
@@ -451,6 +453,7 @@ def test_an_offence_is_clicked(tmp_path, browser):
         inside = tab.frame_locator("iframe")
         assert inside.locator("#verdict").get_attribute("class") == "bad"  # it begins at the first offence
         assert "long.ngc:4: leg tower_b can't close" in inside.locator(".offence").first.inner_text()
+        assert not list_pale_texts(tab)
         tab.focus("#curves")
         for key in ("ArrowRight", "ArrowRight", "ArrowDown"):  # its first curve's second point, and the next curve
             tab.keyboard.press(key)
@@ -471,6 +474,9 @@ def test_an_offence_is_clicked(tmp_path, browser):
         assert offence.inner_text().startswith("long.ngc:4: leg tower_b can't close")  # no path of this computer
         offence.click()
         assert tab.locator("#verdict").get_attribute("class") == "bad"
+        for _ in range(2):
+            assert not list_pale_texts(tab)
+            tab.click("#theme")  # light again, in the end
         gaps, inked = tab.evaluate(INK_IN_GAPS)
         assert gaps >= 1
         assert inked == 0

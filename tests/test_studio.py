@@ -10,7 +10,7 @@ from pathlib import Path
 from zipfile import ZipFile
 
 import pytest
-from browser import needs_chromium, open_browser, open_tab, wait_until
+from browser import list_pale_texts, needs_chromium, open_browser, open_tab, wait_until
 from studio_client import run_studio
 
 import parakin as pk
@@ -412,6 +412,9 @@ def test_the_page_in_a_browser(studio):
         tab.fill("#text", text)
         tab.click("#save")
         wait_until(tab, "studio.findFrame('my_own.yaml') !== null || studio.findFrame('own.yaml') !== null", 20.0)
+        for scheme in ("light", "dark"):
+            tab.emulate_media(color_scheme=scheme)
+            assert not list_pale_texts(tab)
         runs = tab.evaluate("document.querySelectorAll('.run').length")
         tab.reload()
         wait_until(tab, "document.body.dataset.ready === 'yes'", 40.0)

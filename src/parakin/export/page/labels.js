@@ -2,15 +2,15 @@
 
 const AXIS_COLOURS = ["#d13a34", "#2f8f3a", "#2a6fd0"], labels = [];
 
-function addLabel(texts, place, colour = null) {
+function addLabel(texts, place, axis = null) {
   const span = document.createElement("span");
   span.append(...texts);
-  if (colour) {
+  if (axis) {
     span.className = "axis";
-    span.style.color = colour;
+    span.style.color = `var(--${axis.toLowerCase()})`;
   }
   overlay.append(span);
-  labels.push({span, place, axis: colour !== null});
+  labels.push({span, place, axis: axis !== null});
 }
 
 const itemOf = joint => machine.items.findIndex(item => item.name === joint.name && item.kind !== "rail");
@@ -46,7 +46,7 @@ const triad = new THREE.Group();
   if (machine.normal && abs(machine.normal[i]) > 0.999) return;
   const arrow = new THREE.ArrowHelper(unit, new THREE.Vector3(), 0.085 * size, AXIS_COLOURS[i], 0.02 * size, 0.011 * size);
   triad.add(arrow);
-  addLabel([letter], into => into.copy(unit).multiplyScalar(0.1 * size).applyMatrix4(frame), AXIS_COLOURS[i]);
+  addLabel([letter], into => into.copy(unit).multiplyScalar(0.1 * size).applyMatrix4(frame), letter);
 });
 workGroup.add(triad);
 

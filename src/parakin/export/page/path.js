@@ -15,12 +15,14 @@ const sampledJoints = i => rowOf("joints", i, machine.joints.length);
 const SCALE = ["#b2182b", "#ef8a62", "#fddb86", "#67a9cf", "#2166ac"].map(text => new THREE.Color(text).convertSRGBToLinear());
 const OFF_LIMITS = new THREE.Color(0xd50000).convertSRGBToLinear();
 
+const bindingColour = number => path.bindings[number].colour ?? "#9fb3c0";
+
 function colourSample(i, most) {
   const {margins, feed, binding, rapid, broken} = pathColumns;
   if (broken[i]) return OFF_LIMITS;
   if (player.colours === "margin") return mixColours(SCALE, margins[i] / most.margin);
   if (player.colours === "feed") return mixColours(SCALE, feed[i] / most.feed);
-  if (player.colours === "pace") return new THREE.Color(path.bindings[binding[i]].colour ?? "#9fb3c0").convertSRGBToLinear();
+  if (player.colours === "pace") return new THREE.Color(bindingColour(binding[i])).convertSRGBToLinear();
   return new THREE.Color(rapid[i] ? "#90a4ae" : "#00695c").convertSRGBToLinear();
 }
 

@@ -100,17 +100,23 @@ function drawCurves() {
   const pen = curves.getContext("2d"), [low, high] = curveBounds ??= findCurveBounds();
   const yOf = share => height - 14 - (share - low) / (high - low) * (height - 28), xOf = time => path.end > 0 ? time / path.end * width : 0;
   pen.scale(ratio, ratio);
+  pen.fillStyle = styles.getPropertyValue("--ink");
   pen.strokeStyle = styles.getPropertyValue("--bad");
   pen.setLineDash([4, 4]);
   for (const share of [0, 1]) strokeLine(pen, [[0, yOf(share)], [width, yOf(share)]]);
   pen.setLineDash([]);
   const stride = max(1, Math.floor(path.samples / (2 * width)));
+  let nameLeft = 4;
   machine.joints.forEach((joint, j) => {
     const points = [];
     for (let i = 0; i < path.samples; i += stride) points.push([xOf(pathColumns.times[i]), yOf(shareOfRange(joint, pathColumns.joints[i * machine.joints.length + j]))]);
-    pen.strokeStyle = pen.fillStyle = CURVE_COLOURS[j % CURVE_COLOURS.length];
+    pen.strokeStyle = CURVE_COLOURS[j % CURVE_COLOURS.length];
     strokeLine(pen, points);
-    pen.fillText(joint.name, 4 + j * max(44, width / 24), 10);
+    pen.lineWidth = 3;
+    strokeLine(pen, [[nameLeft, 6.5], [nameLeft + 10, 6.5]]);
+    pen.lineWidth = 1;
+    pen.fillText(joint.name, nameLeft + 13, 10);
+    nameLeft += 13 + max(31, pen.measureText(joint.name).width + 14);
   });
   pen.strokeStyle = styles.getPropertyValue("--ink");
   strokeLine(pen, [[xOf(player.time), 0], [xOf(player.time), height]]);
@@ -132,14 +138,16 @@ function showClock() {
   timeText.textContent = `${path.timed ? formatTime(player.time) : `record ${Math.round(player.time)}`}, line ${lines[i]}${pace}`;
 }
 
+const makeKey = (name, colour) => makeElement("b", {}, makeElement("i", {style: `background: ${colour}`}), name);
+
 function drawLegend() {
   const most = {margin: greatestOf("margins", 0.05), feed: greatestOf("feed", 1e-6)};
   legend.replaceChildren();
   if (player.colours === "pace") {
     const used = [...new Set(pathColumns.binding)].filter(Number.isFinite).slice(0, 8);
-    legend.append(...used.map(number => makeElement("b", {textContent: path.bindings[number].name, style: `color: ${path.bindings[number].colour}`})));
+    legend.append(...used.map(number => makeKey(path.bindings[number].name, bindingColour(number))));
   } else if (player.colours === "motion") {
-    legend.append(makeElement("b", {textContent: "feed", style: "color: #00897b"}), makeElement("b", {textContent: "rapid", style: "color: #90a4ae"}));
+    legend.append(makeKey("feed", "#00897b"), makeKey("rapid", "#90a4ae"));
   } else {
     const end = player.colours === "margin" ? `${(100 * most.margin).toFixed(0)} % of half a range` : `${most.feed.toFixed(0)} mm/min`;
     legend.append("0 ", makeElement("i", {className: "scale"}), ` ${end}`);

@@ -111,4 +111,4 @@ def _format_use_heading(use: RangeUse) -> str:
 
 def format_heading(name: str, unit: str, limits: str) -> str:
     """Format a panel's heading, in HTML."""
-    return f"<b>{escape(name)}</b>  <span style='color:#607d8b'>[{unit}]  {limits}</span>"
+    return f"<b>{escape(name)}</b>  <span style='color:var(--soft)'>[{unit}]  {limits}</span>"

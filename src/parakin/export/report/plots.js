@@ -3,7 +3,7 @@
 // panels.py writes it; each is {data: traces, layout}.
 "use strict";
 
-const INK = "#263238", SOFT = "#607d8b", GRID = "#e3e8ec";
+const INK = "#263238", SOFT = "#546e7a", GRID = "#e3e8ec";
 const NEAR = 40;  // px from the pointer: a point farther away is not meant
 const DRAGGED = 6;  // px: less is no span
 

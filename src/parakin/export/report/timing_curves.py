@@ -95,9 +95,9 @@ def _build_feed_panel(trajectory: Trajectory, curves: dict[str, ThinnedCurve]) -
     top = _ROOM * float(feeds.max() if len(feeds) else fastest.values.max())
     key = (
         f"[{unit}]  <span style='color:{_BLUE}'>set by the feed</span>,"
-        " <span style='color:#e65100'>held back by a drive</span>, in rapid grey; programmed dotted"
+        " <span style='color:#b84400'>held back by a drive</span>, in rapid grey; programmed dotted"
     )
-    return Panel(f"<b>feed</b>  <span style='color:#607d8b'>{key}</span>", traces, [0.0, top])
+    return Panel(f"<b>feed</b>  <span style='color:var(--soft)'>{key}</span>", traces, [0.0, top])
 
 
 def _build_position_panel(trajectory: Trajectory, curves: dict[str, ThinnedCurve], number: int) -> Panel:

@@ -391,10 +391,21 @@ def test_the_page_in_a_browser(studio):
         )
         page = next(frame for frame in tab.frames if "part.page.html" in frame.url)
         wait_until(page, "document.getElementById('post')?.hidden === false", 20.0)
+        assert page.evaluate("parakin.player.playing || parakin.player.time > 0")
         page.evaluate("parakin.movePath([2, 0, 0])")
+        tab.emulate_media(reduced_motion="reduce")
+        tab.evaluate("studio.findFrame('own.yaml').dataset.old = 'yes'")
         page.click("#post")
         again = "/--workpiece=X=.*--set=R=510mm/"
         wait_until(tab, f"[...document.querySelectorAll('.run code')].some(one => {again}.test(one.textContent))")
+        shown = "studio.findFrame('own.yaml')"
+        wait_until(
+            tab, f"!{shown}.dataset.old && {shown}.contentDocument.getElementById('post')?.hidden === false", 60.0
+        )
+        page = next(frame for frame in tab.frames if "part.page.html" in frame.url)
+        assert page.evaluate("[parakin.player.playing, parakin.player.time]") == [False, 0]  # nothing moves by itself
+        page.click("#play")
+        wait_until(page, "parakin.player.time > 0")
         tab.click("summary:has-text('Edit the machine')")
         wait_until(tab, "document.getElementById('text').value.includes('kind: length')", 20.0)
         text = tab.input_value("#text")

@@ -338,7 +338,8 @@ async function postPart(place, machines = chosenMachines()) {
     const page = `${output}/${part.replace(/\.[^.]*$/, "")}.page.html`;
     if (state.files.some(file => file.name === page)) showPage(name, page, shown => {
       shown.offerPosting(text => postPart(() => ({"--workpiece": text}), [name]));
-      if (!shown.path.offences.length) shown.setPlaying(true); // else it stands at the first one
+      const still = matchMedia("(prefers-reduced-motion: reduce)").matches;
+      if (!shown.path.offences.length && !still) shown.setPlaying(true); // with offences it stands at the first one
     });
   }
 }

@@ -54,23 +54,25 @@ PALE_TEXTS = r"""least => {
   const listGrounds = one => {
     if (!one) return [[255, 255, 255, 1]];
     const {backgroundColor, backgroundImage} = getComputedStyle(one);
-    const stops = backgroundImage.match(/rgba?\([^)]*\)|color\([^)]*\)/g) || [backgroundColor];
+    const colour = /rgba?\([^)]*\)|color\([^)]*\)/g, stops = backgroundImage.match(colour) || [backgroundColor];
     return listGrounds(one.parentElement).flatMap(under => stops.map(stop => lay(read(stop), under)));
   };
   const light = x => x / 255 <= 0.04045 ? x / 255 / 12.92 : ((x / 255 + 0.055) / 1.055) ** 2.4;
   const brightness = colour => 0.2126 * light(colour[0]) + 0.7152 * light(colour[1]) + 0.0722 * light(colour[2]);
   const measure = (one, part) => Math.min(...listGrounds(one).map(ground => {
-    const [low, high] = [ground, lay(read(getComputedStyle(one, part).color), ground)].map(brightness).sort((a, b) => a - b);
+    const text = lay(read(getComputedStyle(one, part).color), ground);
+    const [low, high] = [ground, text].map(brightness).sort((a, b) => a - b);
     return (high + 0.05) / (low + 0.05);
   }));
   for (const details of document.querySelectorAll("details")) details.open = true;
   const found = [];
   for (const one of document.body.querySelectorAll("*")) {
-    const says = [...one.childNodes].some(node => node.nodeType === 3 && node.data.trim()) || one.matches("input, select, textarea");
-    if (!says || one.matches("script, style, option, [type=range], [type=checkbox]") || !one.checkVisibility({visibilityProperty: true})) continue;
+    const texts = [...one.childNodes].filter(node => node.nodeType === 3).map(node => node.data).join("").trim();
+    if (!texts && !one.matches("input:not([type=range], [type=checkbox]), select, textarea")) continue;
+    if (one.matches("script, style, option") || !one.checkVisibility({visibilityProperty: true})) continue;
     for (const part of one.placeholder ? [null, "::placeholder"] : [null]) {
       const contrast = measure(one, part);
-      if (!(contrast >= least)) found.push(`${one.tagName} #${one.id} .${one.className} ${part || ""} "${one.textContent.slice(0, 30)}": ${contrast.toFixed(2)}`);
+      if (!(contrast >= least)) found.push(`${one.tagName} ${one.id} ${part || ""} ${texts}: ${contrast.toFixed(2)}`);
     }
   }
   return found;

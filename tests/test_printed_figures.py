@@ -39,6 +39,8 @@ def test_a_figure_for_a_page(kind, tmp_path, capsys):
     assert 0.7 * page < float(root.get("width").removesuffix("pt")) / 72.0 <= page + 0.05
     texts = list(root.iter(f"{SVG}text"))
     assert {"X [mm]", "Y [mm]"} <= {text.text for text in texts}
+    upright = {text.text for text in texts if "rotate(-90" in text.get("transform", "")}
+    assert upright <= {"Y [mm]"}  # a scale's name beside it would be longer than the scale of a flat map
     sizes = {re.search(r"([\d.]+)px", text.get("style"))[1] for text in texts}
     assert sizes == {"7"}
     assert path.stat().st_size < 2_000_000

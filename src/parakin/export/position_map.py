@@ -86,7 +86,7 @@ def render_position_map(
         filled = fill_map(axes, grid, values, region, levels, "max", cmap=text.colours)
         bar = figure.colorbar(filled, cax=axes.inset_axes((1.04, 0.0, 0.045, 1.0)))
         set_bar_ticks(bar, axes, levels)
-        bar.set_label(text.label, color=INK, fontsize=9)
+        axes.set_title(text.label, color=INK, fontsize=9, loc="left")  # beside a flat map's scale there is no room
 
     def add_heading(figure: Figure) -> None:
         figure.text(0.03, 0.945, text.title, color=INK, fontsize=13, weight="bold", parse_math=False)

@@ -64,7 +64,7 @@ class Studio:
         in_session = "/sessions/{session}"
         routes = [
             Route("/", _serve_own("studio.html")),
-            *(Route(f"/{name}", _serve_own(name)) for name in ("studio.js", "results.js", "studio.css")),
+            *(Route(f"/{name}", _serve_own(name)) for name in ("studio.js", "runs.js", "results.js", "studio.css")),
             Route("/commands", self._answer(self._describe)),
             Route("/machines/{name}", self._answer(self._send_machine_file)),
             Route("/sessions", self._answer(self._open_session), methods=["POST"]),

@@ -235,7 +235,7 @@ def test_show_asks_at_a_terminal(answer, written, capsys, tmp_path, monkeypatch)
     monkeypatch.setattr("builtins.input", lambda question: answer if "rpr3.html" in question else pytest.fail(question))
     assert main(["show", "rpr3"]) == 0
     assert [path.name for path in tmp_path.iterdir()] == written
-    assert ("picture rpr3.html" in capsys.readouterr().out) == bool(written)
+    assert ("page rpr3.html" in capsys.readouterr().out) == bool(written)
 
 
 def test_show_how_a_joint_is_driven(tmp_path, capsys):

@@ -102,7 +102,7 @@ def show(
     if output is None:
         output = _ask_for_page(machine, force)
     if output is not None:
-        print_text(f"picture {output}")
+        print_text(f"{'page' if output.suffix == '.html' else 'picture'} {output}")
     return 0
 
 

@@ -115,7 +115,8 @@ class Pointing:
                 drives.append(step.drive)
             rotation = product(rotation, make_axis_rotation(step.axis, *compute_exact_sincos(step.value)))
         if len(axes) != 2:
-            raise DescriptionError(key, f"{len(axes)} driven turns point the tool, two are needed")
+            turns = f"{len(axes)} driven turn{'s' * (len(axes) != 1)}"
+            raise DescriptionError(key, f"{turns}, expected two, which point the tool")
         pointing = cls(axes[0], axes[1], apply(rotation, UNIT["tz"]), (signs[0], signs[1]), (drives[0], drives[1]))
         if norm(cross(axes[0], axes[1])) < _PARALLEL:
             raise DescriptionError(key, "its two axes are parallel and can't point the tool")

@@ -6,6 +6,8 @@ from shipped import load_shipped
 from test_performance import everyone, twist_jacobians
 
 import parakin as pk
+from parakin.budget import Budget
+from parakin.performance.certified.bisection import find_undecided_boxes
 from parakin.performance.certified.proofs import (
     bracket_extremes,
     make_pose_box,
@@ -136,6 +138,19 @@ def test_singularities_are_met():
     assert prove_no_singularity(box, "parallel").verdict == "proved"
 
 
+def test_what_is_left_open_is_told_as_a_fraction():
+    """Bisection of a square of which all but the least corner, a quarter in each direction, can be decided."""
+
+    def decide(low, high):
+        return ~((low < 0.25).all(1)), (high - low).argmax(1)
+
+    left = find_undecided_boxes(decide, np.zeros(2), np.ones(2), Budget(None, 30))
+    assert left.fraction == 0.25**2
+    assert (left.middle < 0.25).all()
+    decided = find_undecided_boxes(lambda low, high: (low[:, 0] >= 0.0, low[:, 0]), np.zeros(2), np.ones(2), Budget())
+    assert decided is None
+
+
 def test_a_box_out_of_reach_is_refuted_and_one_out_of_time_is_left_open():
     m = load_shipped("orthoglide")
     proof = prove_no_singularity(cube(m, -100, 200), "serial")
@@ -143,7 +158,8 @@ def test_a_box_out_of_reach_is_refuted_and_one_out_of_time_is_left_open():
     assert "does not reach" in proof.reason
     assert np.isnan(m.inverse(proof.counterexample)).all()
     proof = prove_no_singularity(cube(m, -120, 75), "parallel", boxes=2)
-    assert proof.verdict == "undecided"
+    assert (proof.verdict, proof.undecided) == ("undecided", 1.0)
+    assert proof.reason == "left open about there, in 100 % of the box"
     assert proof.counterexample is not None
     proof = prove_amplification(cube(m, -120, 75), 0.4, 2.9999, boxes=10)
     assert proof.verdict == "undecided"

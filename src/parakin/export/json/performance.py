@@ -98,6 +98,7 @@ def encode_proofs(
                 "counterexample": None if proof.counterexample is None else encode_pose(machine, proof.counterexample),
                 "reason": proof.reason or None,
                 "boxes": proof.boxes,
+                "undecided": proof.undecided,
                 "tolerance": proof.tolerance,
             }
             for proof in proofs

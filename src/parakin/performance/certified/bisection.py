@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 
@@ -32,10 +33,17 @@ def find_widest_inputs(low: Array, high: Array, first: Array) -> Indices:
     return np.asarray(((high - low) / first).argmax(1))
 
 
-def find_undecided_box(
+class Undecided(NamedTuple):
+    """What bisection left undecided: the middle of one such box, (d,), and their fraction of the whole."""
+
+    middle: Array
+    fraction: float
+
+
+def find_undecided_boxes(
     decide: Callable[[Array, Array], Decided], low: Array, high: Array, budget: Budget
-) -> Array | None:
-    """Bisect the box [low, high] until all of it is decided: None, else the middle of a box left undecided."""
+) -> Undecided | None:
+    """Bisect the box [low, high] until all of it is decided: None, else what is left."""
     first = high - low
     bottom, top = low[None], high[None]
     while len(bottom):
@@ -48,7 +56,8 @@ def find_undecided_box(
         if len(lower):
             fine = ((upper - lower) <= FINEST * first).all(1)
             if fine.any() or budget.is_spent():
-                return np.asarray(0.5 * (lower[0] + upper[0]))
+                left = np.concatenate([upper - lower, top - bottom]) / first
+                return Undecided(0.5 * (lower[0] + upper[0]), float(left.prod(1).sum()))
             lower, upper = bisect_inputs(lower, upper, axis)
             bottom, top = np.concatenate([bottom, lower]), np.concatenate([top, upper])
     return None

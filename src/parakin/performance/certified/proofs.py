@@ -22,7 +22,7 @@ from ...workspaces.certified.region import Region
 from ..characteristic_length import choose_characteristic_length
 from ..extremes import SIDES
 from .amplification import Bracket, bracket_amplification
-from .bisection import decide_nonnegative, decide_regular, find_undecided_box
+from .bisection import Undecided, decide_nonnegative, decide_regular, find_undecided_boxes
 from .counterexamples import SingularityKind, find_singular_pose
 from .interval_matrices import PoseBox
 from .quotient_norms import UNBOUNDED
@@ -38,6 +38,7 @@ class Proof:
     reason : why it is not proved, in a line
     brackets : of the least and the greatest amplification, if the claim is on them
     boxes : how many sub-boxes of the box were examined
+    undecided : the fraction of the box that bisection left open
     tolerance : relative; a bound is kept if it is not exceeded by more
     """
 
@@ -48,6 +49,7 @@ class Proof:
     brackets: tuple[Bracket, ...] = ()
     boxes: int = 0
     tolerance: float = 0.0
+    undecided: float = 0.0
 
 
 def make_pose_box(region: Region, ranges: Mapping[str, AxisRange], length: float | None = None) -> PoseBox:
@@ -98,12 +100,10 @@ def prove_no_singularity(
     matrices = {"parallel": lambda: box.parallel, "serial": lambda: box.serial, "constraint": lambda: box.constraint}
     matrix = matrices[kind]()
     decide = decide_regular(MatrixBounds(matrix, box.inputs, box.trace), box.high - box.low)
-    undecided = find_undecided_box(decide, box.low, box.high, budget)
+    undecided = find_undecided_boxes(decide, box.low, box.high, budget)
     if undecided is None:
         return Proof(claim, "proved", boxes=budget.used)
-    return Proof(
-        claim, "undecided", box.poses(undecided[None])[0], "a part is left open about there", boxes=budget.used
-    )
+    return _leave_open(box, claim, undecided, "", budget)
 
 
 def prove_amplification(
@@ -210,10 +210,17 @@ def _prove_reach(box: PoseBox, claim: str, budget: Budget) -> Proof | None:
     if not box.reach:
         return None
     decide = decide_nonnegative(MatrixBounds([box.reach], box.inputs, box.trace), box.high - box.low)
-    undecided = find_undecided_box(decide, box.low, box.high, budget)
+    undecided = find_undecided_boxes(decide, box.low, box.high, budget)
     if undecided is None:
         return None
-    pose = box.poses(undecided[None])[0]
+    pose = box.poses(undecided.middle[None])[0]
     if not np.isfinite(box.machine.inverse(pose, box.mode)).all():
         return Proof(claim, "refuted", pose, "a leg does not reach it", boxes=budget.used)
-    return Proof(claim, "undecided", pose, "whether the legs reach all of it is left open there", boxes=budget.used)
+    return _leave_open(box, claim, undecided, "whether the legs reach it, ", budget)
+
+
+def _leave_open(box: PoseBox, claim: str, undecided: Undecided, what: str, budget: Budget) -> Proof:
+    """Make the proof of a claim that bisection left open, at one place and in a fraction of the box."""
+    reason = f"{what}left open about there, in {100.0 * undecided.fraction:.3g} % of the box"
+    pose = box.poses(undecided.middle[None])[0]
+    return Proof(claim, "undecided", pose, reason, boxes=budget.used, undecided=undecided.fraction)

@@ -10,6 +10,7 @@ demo: .venv/installed
 
 test: .venv/developing lint
 	find src -name "*.nb[ci]" -delete  # Numba's cache does not see a change in a file that a kernel calls
+	$(BIN)/python tests/compile_kernels.py  # once, and not in each of three processes
 	$(BIN)/python -m pytest -n 3  # on two cores: LinuxCNC's runs wait for much of their time
 
 lint: .venv/developing

@@ -432,11 +432,57 @@ def test_the_page_in_a_browser(studio):
         assert tab.evaluate("document.querySelectorAll('.run').length") >= runs  # the same session
 
 
+PRESSED = [
+    ["workspace", {"--gap": "0.3", "--output": ["workspace_own.svg"]}],
+    ["workspace", {"--box": True, "--output": ["box_own.json"]}],
+    ["atlas", {"--output": "atlas_own"}],
+    ["post", {"PART": "part.apt", "--page": True, "--output": "on_own"}],
+    ["post", {"PART": "part.apt", "--page": True, "--output": "on_own", "--place": "200mm"}],
+    ["post", {"PART": "part.apt", "--page": True, "--output": "on_own", "--workpiece": "X=10,Y=-5"}],
+    ["compare", {"--part": "part.apt", "--output": "compared.html"}],
+    ["linuxcnc", {"--output": "linuxcnc_own"}],
+]
+FOCUSED = "(e => e.id || e.textContent)(document.activeElement)"
+
+
+def press_all(tab):
+    """Go through the studio from the first Tab on, and press all that begins a run; what each asks for."""
+    asked, ways = [], []
+
+    def answer(route):
+        if route.request.method == "POST":
+            asked.append(route.request.post_data_json)
+        route.fulfill(status=400, json={"error": f"not now {len(asked)}"})
+
+    tab.route("**/runs", answer)
+    for _ in range(5):
+        tab.keyboard.press("Tab")
+        ways.append(tab.evaluate(FOCUSED))
+    assert ways == ["machine", "second", "part", "drop", "Edit the machine's file"]
+    for number, _ in enumerate(PRESSED, 1):
+        tab.keyboard.press("Tab")
+        tab.keyboard.press("Enter")
+        wait_until(tab, f"document.querySelector('#runs p.bad')?.textContent === 'not now {number}'")
+    tab.keyboard.press("Tab")
+    assert tab.evaluate(FOCUSED) == "Any command"
+    tab.unroute("**/runs")
+    return asked
+
+
 @needs_chromium
 def test_seeded_presses_leave_it_alive(studio):
     with open_browser() as browser, open_tab(browser, 1100, 700) as tab:
         tab.goto(studio.address)
         wait_until(tab, "document.body.dataset.ready === 'yes'", 40.0)
+        wait_until(tab, "studio.readPose('own.yaml') !== null", 40.0)
+        tab.frames[1].evaluate("parakin.moveToPose([10, -5, 0.1])")
+        for one, (command, values) in zip(press_all(tab), PRESSED, strict=True):
+            machine = {"post": "--machine", "compare": "NAMES"}.get(command, "NAME")
+            name = ["own.yaml"] if command == "compare" else "own.yaml"
+            assert (one["command"], one["values"]) == (command, values | {machine: name})
+        tab.context.grant_permissions(["clipboard-read", "clipboard-write"])
+        tab.click("#runs .run button:text-is('Copy')")
+        assert tab.evaluate("navigator.clipboard.readText()") == "parakin page own.yaml --output=page_own.html"
         tab.evaluate(PRESS)
         wait_until(
             tab,

@@ -1,10 +1,12 @@
-"""The house rules that a reader can see: sizes of files, names of files and locals, plain words, no dead code."""
+"""The house rules that a reader can see: sizes of files, names, plain words, no dead code, docstrings that tell all."""
 
 import ast
 import re
 from collections import Counter
+from typing import NamedTuple
 
 import pytest
+from docstrings import CLASSES, FUNCTIONS, find_undescribed, find_unnamed_arguments
 from sources import MODULES, ROOT, TREES, for_each, functions
 
 SOURCES = sorted(path for ending in ("py", "c", "js", "css") for path in ROOT.rglob(f"*.{ending}"))
@@ -93,6 +95,46 @@ def test_nothing_stands_for_the_tests_alone():
     names = {name for module in MODULES if not module.startswith("model.legs.") for name in definitions(module)}
     assert len(names) > 1000
     assert not {name for name in names if words[name] == 1} - FROM_OUTSIDE
+
+
+@for_each(FUNCTIONS)
+def test_functions_name_their_arguments(function):
+    assert not find_unnamed_arguments(function)
+
+
+@for_each(CLASSES)
+def test_classes_describe_their_fields_and_name_arguments(kind):
+    assert not find_undescribed(kind)
+
+
+def test_what_users_get_is_looked_at():
+    names = {kind.__name__ for kind in CLASSES}
+    assert {"Machine", "Family", "FamilyRates", "Posted", "Offence", "Performance", "Drive", "Setpoints"} <= names
+    assert len(names) > 100
+
+
+def test_what_a_docstring_lacks_is_seen():
+    def answer(poses, mode):
+        """Answer for ``poses``."""
+
+    class Rows(NamedTuple):
+        """Rows.
+
+        poses : (n, axes)
+        """
+
+        poses: int
+        mode: str
+
+        def take(self, count, poses):
+            """Take some of the count."""
+
+        @property
+        def first(self):
+            return self.poses
+
+    assert find_unnamed_arguments(answer) == ["mode"]
+    assert find_undescribed(Rows) == ["mode", "take(count)", "first"]
 
 
 def test_all_that_break_a_rule_are_listed():

@@ -78,7 +78,7 @@ def analyse_accuracy(
 ) -> Accuracy:
     """Analyse the tool's error where numbers of a machine lie evenly within tolerances.
 
-    machine : whose home and whose limits tell the poses
+    machine : with its nominal numbers
     tolerances : by names, patterns or groups of :attr:`Machine.parameters`, either way, with units: ``{"feet": "0.05
         mm", "rods": "0.02 mm", "encoders": "2 um"}``; each coordinate of a point has it
     poses : (N, axes), mm and rad; by default as many as ``samples`` all over the workspace, clear of singularities

@@ -47,12 +47,13 @@ class Calibration:
     """The machine of a family that explains measurements best.
 
     family : of the numbers that were sought
-    sizes, covariance : (k,) mm and rad, and (k, k), as the noise makes it
+    sizes, covariance : (k,) mm and rad, and (k, k), of the noise that was stated, or of ``fit`` times as much where
+        that is more
     fixed : numbers that others replace whatever is measured of poses; they keep their values
     setups : what measured, each with the numbers that were found of it, mm and rad; ``frame`` and ``centre`` tell them
     measured : what they were found from
     residuals : (N, c) measured less predicted, mm and rad; of whole poses the twist
-    before : the same with the machine as it was
+    before : (N, c) the same with the machine as it was
     fit, held_out : root mean square of the weighed residuals, one if noise and machine are what was stated; of rows
         that the fit knew, and of rows that it did not (5 folds)
     outliers : rows with a weighed residual beyond 5

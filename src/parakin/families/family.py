@@ -262,7 +262,7 @@ class Family:
         return self._keep(("check", mode, chosen), n, outputs)
 
     def base_joints(self, poses: RowsLike, sizes: RowsLike, mode: str | None = None) -> Array:
-        """Compute where struts are joined to the base, mm in its frame M: (..., axes), (..., k) -> (..., struts, 3)."""
+        """Compute the struts' joints at the base, (..., axes) and (..., k) -> (..., struts, 3) mm, machine's frame."""
         mode, (n, _) = self.machine.checked_mode(mode), self._counts
         lead, rows = self._rows([(poses, self.machine.axes, "poses")], sizes)
         tape = self._keep(("base joints", mode), n, lambda e, x: [c for foot in e.list_feet(x, mode) for c in foot])

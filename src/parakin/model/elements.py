@@ -33,7 +33,7 @@ class Drive:
 
     name, unit : the joint's, unit ``mm`` or ``rad``
     low, high : its range
-    speed, acceleration, jerk : the greatest, mm or rad by s, s² and s³
+    speed, acceleration, jerk : the greatest, mm/s, mm/s², mm/s³, or rad
     counts, lead : steps or encoder counts of a motor's turn, and what the joint moves meanwhile, negative where the
         motor turns the other way; None: not said
     homing : where the home switch trips, or ``absolute`` for an encoder that needs none; None: not said

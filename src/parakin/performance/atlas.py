@@ -38,9 +38,9 @@ class PerformanceMap:
 
     region : without swept axes
     step : between positions of the grid, mm
-    grid : coordinates along each of the region's free axes, mm
-    allowed : (grid) whether the machine is allowed there
-    slack : (grid) zero on the region's boundary, positive inside, negative outside
+    grid : the coordinates along each of the region's free axes, (n0,), (n1,) ... mm
+    allowed : (n0, n1, ...) whether the machine is allowed there
+    slack : (n0, n1, ...) zero on the region's boundary, positive inside, negative outside
     performance : at all positions of the grid, allowed or not; NaN out of reach
     """
 
@@ -106,7 +106,7 @@ class Atlas:
         """Return one of :attr:`extremes`.
 
         quantity : ``condition``, ``greatest``, ``least``, ``manipulability``, or a margin's name
-        side : ``min`` or ``max``
+        side : ``least`` or ``greatest``
         """
         return next(e for e in self.extremes if e.quantity == quantity and e.side == side)
 

@@ -33,7 +33,7 @@ class Extreme:
 
     quantity : ``condition``, ``greatest``, ``least`` or ``manipulability``, as
         :class:`parakin.performance.indices.Performance` has them, or a singularity margin's name
-    side : ``min`` or ``max``
+    side : ``least`` or ``greatest``
     value : in the quantity's unit
     pose : (axes,) mm and rad, that has it
     """

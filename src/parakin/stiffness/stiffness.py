@@ -46,7 +46,7 @@ class Stiffness:
 
     @property
     def translations(self) -> tuple[str, ...]:
-        """The axes along which the tip moves."""
+        """The t axes along which the tip moves."""
         return tuple(axis for axis in self.machine.axes if axis in "XYZ")
 
     @property
@@ -77,7 +77,9 @@ class Stiffness:
     def along(self, direction: RowsLike) -> Array:
         """Compute the tip's stiffness along a direction, (N,) N/mm: a force along it by the tip's way along it.
 
-        direction : in the machine's frame, by :attr:`translations`, (t,) or a dict, of any length
+        direction : along the pose's axes, by :attr:`translations`, (t,) or a dict, of any length
+
+        Raises :class:`PoseError` for one without a length.
         """
         row = read_rows(direction, self.translations, ["mm"] * len(self.translations), self._rest, "direction")
         size = np.linalg.norm(row, axis=-1, keepdims=True)
@@ -90,7 +92,9 @@ class Stiffness:
     def deflect(self, force: RowsLike) -> Array:
         """Compute how the tool gives way to a force on its tip, (N, n): the twist, mm and rad.
 
-        force : N by the translations, one (t,), a row a pose (N, t), or a dict
+        force : N by the translations, along the pose's axes: one (t,), a row a pose (N, t), or a dict
+
+        Raises :class:`PoseError` for more or less rows than poses.
         """
         tip = len(self.translations)
         rows = read_rows(force, self.translations, ["mm"] * tip, self._rest, "force")

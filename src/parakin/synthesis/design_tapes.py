@@ -68,7 +68,7 @@ class DesignTapes:
     def springs(self) -> MachineSprings:
         """The springs of drives and struts, as they are given or as the machine's file says.
 
-        Raises :class:`PoseError`.
+        Raises :class:`PoseError` where neither tells a drive's.
         """
         return read_springs(self.machine, self._drives, self._struts)
 
@@ -76,7 +76,7 @@ class DesignTapes:
     def tolerances(self) -> ToleranceFamily:
         """The tolerances of the machine's numbers.
 
-        Raises :class:`PoseError`.
+        Raises :class:`PoseError` where there are none, or one of no number.
         """
         if self._tolerances is None:
             raise PoseError("tolerances: missing, accuracy needs them")

@@ -31,7 +31,7 @@ _SAME = 1e-3  # relative: a reserve that grows by less is the same
 class Reserve:
     """What the nominal machine keeps in hand, so that all machines within tolerance keep the wants.
 
-    margins : of the limits that count, as :attr:`Measures.margins`; zero without tolerances, as all others
+    margins : (limits,) of those that count, as :attr:`Measures.margins`; zero without tolerances, as all others
     low, high : (legs,) of the ends of the legs' drives, mm and rad
     losses : of quantities by their names
     """
@@ -79,7 +79,7 @@ class SizeBox:
 
     @cached_property
     def follow_rates(self) -> Array:
-        """How each number (rows) moves with each one that is off (columns): with itself, and with the named sizes."""
+        """How each number moves with each one that is off, (k, k): with itself, and with the named sizes."""
         rates = np.eye(len(self.names))
         for column, parameter in enumerate(self._parameters):
             if parameter.group == SIZES:

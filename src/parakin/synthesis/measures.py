@@ -78,7 +78,7 @@ class Measures:
 
     @cached_property
     def margins(self) -> Array:
-        """Margins of the limits that count, ≥ 0 where they are kept, in parts of the machine's size or rad."""
+        """Margins of the limits that count, (S, P, limits), ≥ 0 where kept, in parts of the machine's size or rad."""
         tapes = self._tapes
         return np.asarray(tapes.family.margins(self._poses, self._sizes)[..., tapes.counted] * tapes.limit_scales)
 

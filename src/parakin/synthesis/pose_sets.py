@@ -84,7 +84,7 @@ class PoseSet:
 
     @property
     def bounds(self) -> tuple[Array, Array]:
-        """Low and high of the coordinates, mm and rad."""
+        """Low and high of the coordinates, (coordinates,) mm and rad each."""
         low, high = np.array(list(self.coordinates.values())).T
         return low, high
 

@@ -229,7 +229,7 @@ class DesignProblem:
         return (*self.family.names, *(f"shift {key}" for key in self.shift))
 
     def format_variables(self, values: Mapping[str, float], digits: str) -> str:
-        """Format values of the variables in a line, each with its unit; ``digits`` is a format."""
+        """Format ``values`` of the variables, mm and rad, in a line, each with its unit; ``digits`` is a format."""
         units = {parameter.name: parameter.unit for parameter in self.family.parameters}
         own = ((name, value, units.get(name, "mm")) for name, value in values.items())
         return ", ".join(f"{name} {to_display(value, u):{digits}} {name_display_unit(u)}" for name, value, u in own)
@@ -258,7 +258,7 @@ class DesignProblem:
 
     @cached_property
     def lattice(self) -> Array:
-        """Points all over the sets."""
+        """Points (P, width) all over the sets."""
         return np.concatenate([self.make_points(i, poses.make_lattice()) for i, poses in enumerate(self.pose_sets)])
 
     @property

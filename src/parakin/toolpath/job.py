@@ -97,7 +97,7 @@ class Job(Displayed):
 
     @property
     def seconds(self) -> float | None:
-        """The cycle time, None where there is no trajectory."""
+        """The cycle time, s; None where there is no trajectory."""
         return None if self.trajectory is None else self.trajectory.seconds + self.waits
 
     def __repr__(self) -> str:

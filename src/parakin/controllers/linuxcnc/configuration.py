@@ -37,7 +37,7 @@ def make_linuxcnc_configuration(
     page that tells how to start, all named after the machine. The last line of each tells by a hash whether the file
     was edited since.
 
-    machine : as it stands, its mode the one of its kinematics
+    machine : in whose default working mode the kinematics is
     hardware : ``mesa-7i96s``, ``mesa-7i76e``, ``parport`` or ``ethercat``; None: a simulation
     screen : ``axis`` or ``gmoccapy``, LinuxCNC's own, beside the window that shows the machine
 

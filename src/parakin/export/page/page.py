@@ -77,7 +77,7 @@ def render_path_page(posted: Posted, trajectory: Trajectory | None = None, numbe
     """Render such a page with the tool path of a posted part, which can be played.
 
     posted : :attr:`Job.posted`, the path on a machine
-    trajectory : :attr:`Job.trajectory`, by whose time it is played; without it by the programmed feed
+    trajectory : :attr:`Job.trajectory`, by whose time it is played; without it record by record
     numbers : how many of the path the page may hold, some 5 bytes each; the fewer, the coarser are its samples
 
     Raises :class:`PoseError` for a path without records.

@@ -35,6 +35,8 @@ def workpiece(
 
     X, Y, Z : where its frame's origin lies in the machine's frame, mm or texts with their unit
     A, B, C : its angles there, rad or texts with their unit, ``B="30 deg"``
+
+    Raises :class:`PoseError` for what is no finite length or angle.
     """
     values = {"X": X, "Y": Y, "Z": Z, "A": A, "B": B, "C": C}
     numbers = [parse_coordinate(axis, value, AXIS_UNITS[axis]) for axis, value in values.items()]

@@ -27,7 +27,7 @@ class Setpoints:
 
     columns : names of :attr:`table`'s columns
     times : (k,) s
-    joints, speeds, accelerations : (k, joints), by s and s²
+    joints, speeds, accelerations : (k, joints) mm, mm/s, mm/s², or rad
     poses : (k, axes) of the tool, as in :attr:`Posted.poses`
     """
 
@@ -40,7 +40,7 @@ class Setpoints:
 
     @property
     def table(self) -> Array:
-        """All columns as one table: ``time``, ``d1`` ..., ``d1.speed`` ..., ``d1.acceleration`` ..., ``X`` ..."""
+        """All columns, (k, columns): ``time``, ``d1`` ..., ``d1.speed`` ..., ``d1.acceleration`` ..., ``X`` ..."""
         return np.column_stack([self.times, self.joints, self.speeds, self.accelerations, self.poses])
 
     def __repr__(self) -> str:

@@ -189,9 +189,9 @@ class Region:
         return self.find_extent()
 
     def find_extent(self, budget: Budget | None = None) -> tuple[Array, Array] | None:
-        """Find a box proved to hold the whole region, not much larger than it; None for a region proved empty.
+        """Find a box, (d,) mm each corner, that is proved to hold the whole region; None for one proved empty.
 
-        It is that of all components: the limits bound the machine, and no sign of a determinant does.
+        It holds all components, for limits bound the machine and no sign of a determinant does; it is not much larger.
 
         budget : the time, by default 60 s; where it ends before, the box is larger than need be, else it is kept
 

@@ -93,6 +93,7 @@ class Cells:
 
     @cached_property
     def undecided_volumes(self) -> Array:
+        """The volume of each cell that is not decided, (N,) mm³ (mm² in the plane)."""
         return np.asarray((self.outer - self.inner) * self.volumes)
 
     def take(self, which: Flags | Indices) -> Cells:
@@ -282,8 +283,8 @@ class Subdivision(ABC):
     def tighten(self, fraction: float, budget: Budget | None = None) -> tuple[Array, Array] | None:
         """Refine the outermost cells until none is larger than a fraction of the box about all cells.
 
-        Returns that box, or None if there are no cells. Faces along which very many cells lie are left as they are,
-        and so are all where the budget is spent.
+        Returns that box, (d,) mm each corner, or None if there are no cells. Faces along which very many cells lie are
+        left as they are, and so are all where the budget is spent.
 
         fraction : of the box's edges
         budget : of time

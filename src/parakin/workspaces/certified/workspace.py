@@ -90,7 +90,7 @@ class Workspace(RegionResult, Displayed):
 
     @cached_property
     def box(self) -> tuple[Array, Array] | None:
-        """Lower and upper corner of a box proved to hold the region; None if it is empty."""
+        """Lower and upper corner of a box proved to hold the region, (d,) mm each; None if it is empty."""
         if self.empty:
             return None
         return self.cells.low.min(0), (self.cells.low + self.cells.size).max(0)

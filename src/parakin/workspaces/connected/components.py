@@ -44,7 +44,7 @@ class Component:
     sign : of det A, 1 where it is as at home, else -1; 1 with more drives than freedoms
     volume : mm³ (in the plane mm²): at least what is proved to hang together, at most with all cells that may
     position : a position in it, (d,) mm
-    low, high : corners of a box proved to hold it
+    low, high : corners of a box proved to hold it, (d,) mm
     apart : it is proved to hang together with no other component
     """
 

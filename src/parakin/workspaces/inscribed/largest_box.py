@@ -65,12 +65,12 @@ class InscribedBox(RegionResult):
 
     @property
     def edges(self) -> Array:
-        """The lengths of its edges, mm."""
+        """The lengths of its edges, (d,) mm."""
         return self.high - self.low
 
     @property
     def centre(self) -> Array:
-        """Its middle, mm."""
+        """Its middle, (d,) mm."""
         return 0.5 * (self.low + self.high)
 
     @property

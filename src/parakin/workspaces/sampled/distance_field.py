@@ -202,9 +202,9 @@ class SampledField:
     """A distance field at the nodes of a grid, mm, positive inside, cut off at 2 steps.
 
     distance : the field at any other position
-    box : lower and upper corner of a box that holds the region, mm
-    low : (d,) position of the first node
-    step : (d,) between nodes
+    box : lower and upper corner of a box that holds the region, (d,) mm each
+    low : (d,) mm, of the first node
+    step : (d,) mm, between nodes
     values : (n0, n1, ...); the outermost nodes are outside, so that the surface about the region is closed
     """
 
@@ -226,7 +226,7 @@ class SampledField:
 
     @property
     def span(self) -> tuple[Array, Array]:
-        """Lower and upper corner of what is inside, to half a step; of the whole box if no node is."""
+        """Lower and upper corner of what is inside, (d,) mm each, to half a step; of the box if no node is."""
         if not len(self.inside):
             return self.box
         first, last = self.inside.min(0), self.inside.max(0)

@@ -31,7 +31,7 @@ MOST_CELLS = 500_000_000  # a byte each
 class GridWorkspace(SampledWorkspace):
     """A region by the cells whose middles are allowed: ``estimate`` is their number times the volume of one.
 
-    coordinates : of the cells' middles along each axis, mm
+    coordinates : of the cells' middles along each axis, (n0,), (n1,) ... mm
     broken : (n, ...) as many axes as coordinates, 0 where the position is allowed, else 1 + the index in
         ``region.limits`` of the first limit broken
     """
@@ -57,7 +57,7 @@ class GridWorkspace(SampledWorkspace):
 
     @property
     def box(self) -> tuple[Array, Array] | None:
-        """Lower and upper corner of the box about all allowed cells; None if there are none."""
+        """Lower and upper corner of the box about all allowed cells, (d,) mm each; None if there are none."""
         if self.empty:
             return None
         allowed = [x[count > 0] for x, count in zip(self.coordinates, self._layer_counts, strict=True)]

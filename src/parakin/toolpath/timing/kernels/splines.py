@@ -60,7 +60,7 @@ class JointState(NamedTuple):
     """Joints, and how they move at k states.
 
     joints : (k, joints) mm and rad
-    speeds, accelerations : (k, joints) by s and s²
+    speeds, accelerations : (k, joints) mm/s, mm/s², or rad
     """
 
     joints: Array

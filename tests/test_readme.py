@@ -78,6 +78,19 @@ def test_what_the_readme_links_to_is_there():
             assert target.startswith("http") or (page.parent / target).exists(), f"{page}: {target}"
 
 
+def test_files_and_names_of_the_library_that_pages_tell_exist():
+    folders = ("src", "tests", "docs", "examples", "scripts", "benchmarks", ".ci")
+    files = [str(path) for folder in folders for path in (ROOT / folder).rglob("*")]
+    for page in PAGES:
+        text = re.sub(r"```.*?```", "", page.read_text(encoding="utf-8"), flags=re.S)
+        for name in re.findall(r"`(?:python )?([\w./-]+(?:\.py|\.js|\.sh|/))(?: [^`]*)?`", text):
+            written = re.sub(r"^(NAME|tricept)(?=_screen\.py$)", "", name) != name
+            end = "/" + name.rstrip("/")
+            assert written or any(file.endswith(end) for file in files) or (ROOT / name).exists(), f"{page}: {name}"
+        for name in re.findall(r"\bpk\.(\w+)", text):
+            assert name in pk.__all__, f"{page}: {name}"
+
+
 def test_the_python_of_the_readme_runs(tmp_path, monkeypatch):
     block = re.search(r"```python\n(.*?)```", README, re.S)[1]
     monkeypatch.chdir(tmp_path)

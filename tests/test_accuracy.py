@@ -58,7 +58,7 @@ def test_drawn_machines_err_as_predicted(name):
     ranges = {axis: (value, value) for axis, value in zip(machine.axes, pose.tolist(), strict=True)}
     bound = pk.bound_worst_case(accuracy, ranges)
     assert worst <= min(1.001 * bound.attained, bound.bound)
-    assert bound.attained <= bound.bound < 1.06 * bound.attained
+    assert bound.attained <= bound.bound < 1.01 * bound.attained
     assert accuracy.greatest[0] > 0.99 * bound.attained
 
 
@@ -82,6 +82,34 @@ def test_no_machine_breaks_the_bound_over_a_box(name, ranges):
     assert 0.4 * proved.attained < errors.max() <= proved.bound
 
 
+@pytest.mark.parametrize(
+    ("name", "pose"),
+    [
+        ("rus6", (-59.115, -143.487, -424.663, -0.208, -0.326, 0.127)),  # thin cranks, near a singularity
+        ("cmw_300", (20.0, 20.0, -970.0, 0.2, 0.2, 0.2)),
+        ("five_bar", (100.0, 300.0)),
+    ],
+)
+def test_at_one_pose_the_bound_is_close(name, pose):
+    """Against machines that are bettered number by number from the worst of some at ends, by their direct problems."""
+    machine, pose = load_shipped(name), np.array(pose)
+    groups = {parameter.group for parameter in machine.parameters if parameter.unit == "mm"}
+    accuracy = pk.analyse_accuracy(machine, dict.fromkeys(sorted(groups - {"sizes"}), "0.05 mm"), pose[None])
+    ranges = {axis: (value, value) for axis, value in zip(machine.axes, pose.tolist(), strict=True)}
+    proved, within = pk.bound_worst_case(accuracy, ranges), accuracy.tolerances
+
+    def err(ends):
+        return draw_errors(within, pose, within.family.nominal + ends * within.halves)
+
+    ends = np.random.default_rng(0).choice([-1.0, 1.0], (1_000, len(within.halves)))
+    worst = ends[err(ends).argmax()]
+    for _ in range(4):
+        turned = np.where(np.eye(len(worst), dtype=bool), -worst, worst)
+        worst = np.where(err(turned) > err(worst[None]), -worst, worst)
+    assert 0.9 * proved.attained < err(worst[None])[0] <= proved.bound
+    assert proved.attained <= proved.bound < 1.02 * proved.attained
+
+
 def test_what_is_singular_is_unproved(capsys):
     machine = load_shipped("tricept")
     accuracy = pk.analyse_accuracy(machine, {"feet": "0.05 mm"}, samples=10)
@@ -94,11 +122,13 @@ def test_what_is_singular_is_unproved(capsys):
     assert "singular" not in said
 
 
+@pytest.mark.parametrize("finer", [1, 4])
 @pytest.mark.parametrize("size", [1, 2, 3])
-def test_the_directions_are_as_near_as_they_say(size):
-    directions, cosine = list_directions(size)
+def test_the_directions_are_as_near_as_they_say(size, finer):
+    directions, cosine = list_directions(size, finer)
+    directions = directions.reshape(-1, size)
     assert np.allclose(np.linalg.norm(directions, axis=1), 1.0)
-    drawn = np.random.default_rng(0).normal(size=(20_000, size))
+    drawn = np.random.default_rng(0).normal(size=(2_000, size))
     drawn /= np.linalg.norm(drawn, axis=1)[:, None]
     assert np.abs(drawn @ directions.T).max(1).min() >= cosine
 

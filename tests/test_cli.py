@@ -462,3 +462,8 @@ def test_bash_completes_machines_files_and_parts(tmp_path):
 
 def test_a_page_of_a_part_asks_for_its_machine(part, capsys):
     assert "needs the machine that it is for; expected --machine" in refused(capsys, "page", part)
+
+
+def test_a_negative_value_that_is_taken_for_an_option_is_told_how_to_write(capsys):
+    assert "A negative value is written --cell=-5mm" in refused(capsys, "workspace", "tricept", "--cell", "-5mm")
+    assert "--cell: " in refused(capsys, "workspace", "tricept", "--cell=-5mm")

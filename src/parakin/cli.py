@@ -11,7 +11,7 @@ import warnings
 from collections.abc import Sequence
 from contextlib import suppress
 
-from cyclopts import App, CycloptsError, Parameter, UnusedCliTokensError
+from cyclopts import App, CycloptsError, MissingArgumentError, Parameter, UnusedCliTokensError
 
 from .commands.accuracy import accuracy
 from .commands.assemblies import assemblies
@@ -84,6 +84,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         values = join_words([*map(quote, error.unused_tokens or ())])
         print_remark(f"parakin: {words[0]} takes no more values, got {values}")
         return _MALFORMED
+    except MissingArgumentError as error:
+        print_remark(f"parakin: {' '.join(str(error).split())}{_explain_hyphen(words, error.keyword)}")
+        return _MALFORMED
     except CycloptsError as error:
         print_remark(f"parakin: {' '.join(str(error).split())}")
         return _MALFORMED
@@ -114,6 +117,12 @@ def _check_words(words: Sequence[str]) -> None:
         if not word or (equals and not value and option.startswith("-")):
             behind = f"behind {words[k - 1]}" if k and not word else f"for {option}" if word else "in front"
             raise InputError(f"an empty value {behind}; expected a file, a name or a value", "parakin")
+
+
+def _explain_hyphen(words: Sequence[str], option: str | None) -> str:
+    """Tell how to write a negative value, which is taken for an option, where one stands behind an option."""
+    value = words[words.index(option) + 1 :][:1] if option in words else []
+    return f" A negative value is written {option}={value[0]}" if value and value[0][1:2].isdigit() else ""
 
 
 def _name_option(error: PoseError, command: App) -> str:

@@ -465,8 +465,23 @@ def press_all(tab):
         wait_until(tab, f"document.querySelector('#runs p.bad')?.textContent === 'not now {number}'")
     tab.keyboard.press("Tab")
     assert tab.evaluate(FOCUSED) == "Any command"
+    tab.select_option("#second", "rrr3")  # which begins a run of its page
+    wait_until(tab, f"document.querySelector('#runs p.bad').textContent === 'not now {len(PRESSED) + 1}'")
+    tab.click("#quick button:text-is('Compare')")
+    wait_until(tab, f"document.querySelector('#runs p.bad').textContent === 'not now {len(PRESSED) + 2}'")
+    *asked, page, compare = asked
+    assert (page["command"], page["values"]["NAME"]) == ("page", "rrr3")
+    assert (compare["command"], compare["values"]["NAMES"]) == ("compare", ["own.yaml", "rrr3"])
+    tab.select_option("#second", "")
     tab.unroute("**/runs")
     return asked
+
+
+DROP = """([name, length]) => {
+  const dataTransfer = new DataTransfer();
+  dataTransfer.items.add(new File([new Uint8Array(length).fill(10)], name));
+  document.dispatchEvent(new DragEvent("drop", {dataTransfer, cancelable: true}));
+}"""
 
 
 @needs_chromium
@@ -480,6 +495,13 @@ def test_seeded_presses_leave_it_alive(studio):
             machine = {"post": "--machine", "compare": "NAMES"}.get(command, "NAME")
             name = ["own.yaml"] if command == "compare" else "own.yaml"
             assert (one["command"], one["values"]) == (command, values | {machine: name})
+        tab.evaluate(DROP, ["dropped.apt", 9])
+        wait_until(tab, "document.getElementById('part').value === 'dropped.apt'")
+        tab.evaluate(DROP, ["table.csv", 9])
+        wait_until(tab, "document.getElementById('files').textContent.includes('table.csv')")
+        tab.evaluate(DROP, ["large.apt", 2**26 + 1])
+        wait_until(tab, "document.querySelector('#runs p.bad').textContent.startsWith('large.apt: larger than 64 MiB')")
+        assert tab.evaluate("document.getElementById('part').value") == "dropped.apt"
         tab.context.grant_permissions(["clipboard-read", "clipboard-write"])
         tab.click("#runs .run button:text-is('Copy')")
         assert tab.evaluate("navigator.clipboard.readText()") == "parakin page own.yaml --output=page_own.html"

@@ -215,17 +215,19 @@ async function refreshFiles() {
 }
 
 async function upload(files) {
+  const taken = [];
   for (const file of files) {
     try {
       await ask(inSession(`files/${escapeName(file.name)}`), {method: "PUT", body: file});
+      taken.push(file.name);
     } catch (error) {
       element("runs").prepend(make("p", {className: "bad state", textContent: error.message}));
     }
   }
   await refreshFiles();
-  const last = [...files].map(file => file.name).at(-1);
+  const last = taken.at(-1);
   if (ownMachines().includes(last)) { element("machine").value = last; await showMachines(); }
-  else if (last) element("part").value = last;
+  else if ([...element("part").options].some(option => option.value === last)) element("part").value = last;
   showForm();
 }
 

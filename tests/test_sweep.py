@@ -212,6 +212,7 @@ def test_what_is_mistaken_is_said_in_one_line(tmp_path, capsys, monkeypatch, mor
     assert main(["sweep", str(tmp_path / "problem.yaml"), "-o", str(tmp_path / "out"), *more]) == 2
     error = capsys.readouterr().err
     assert said in error
+    assert not (tmp_path / "out").exists()
     assert "Traceback" not in error
 
 

@@ -79,12 +79,13 @@ def run_sweep(
     Raises :class:`InputError` for a folder with another sweep or a scheduler that does not answer.
     """
     base, names = Path(folder), [f"part-{number:05d}.parquet" for number in range(plan.chunk_count)]
-    _prepare_folder(plan, base)
+    _refuse_another_sweep(plan, base)
     missing = [number for number, name in enumerate(names) if not (base / name).exists()]
     evaluator = SweepEvaluator(plan)
     made, begin = 0, CLOCK.read()
     wanted = sum(_count_designs(plan, number) for number in missing)
     with _open_source(plan, evaluator, missing, scheduler, show_dashboard) as chunks:
+        _write_plan(plan, base)  # not before: a scheduler that does not answer leaves no folder
         for number, chunk in chunks:
             write_files(base, {names[number]: _write_parquet(plan, evaluator.limits, chunk)})
             made += len(chunk.designs)
@@ -99,18 +100,22 @@ def _count_designs(plan: SweepPlan, chunk: int) -> int:
     return min(plan.chunk_size, plan.designs - chunk * plan.chunk_size)
 
 
-def _prepare_folder(plan: SweepPlan, base: Path) -> None:
+def _refuse_another_sweep(plan: SweepPlan, base: Path) -> None:
+    file = base / _PLAN
+    if not file.exists():
+        return
+    try:
+        kept = json.loads(file.read_text("utf-8"))
+    except (OSError, ValueError) as error:
+        raise InputError(f"can't be read: {error}", str(file)) from None
+    if not isinstance(kept, dict) or kept.get("digest") != plan.digest:
+        raise InputError("another sweep is in this folder; choose another one", str(file))
+
+
+def _write_plan(plan: SweepPlan, base: Path) -> None:
     said = {"schema": _SCHEMA, "machine": plan.problem.machine.name, "designs": plan.designs, "poses": plan.poses}
     said |= {"seed": plan.seed, "digest": plan.digest}
-    file = base / _PLAN
-    if file.exists():
-        try:
-            kept = json.loads(file.read_text("utf-8"))
-        except (OSError, ValueError) as error:
-            raise InputError(f"can't be read: {error}", str(file)) from None
-        if not isinstance(kept, dict) or kept.get("digest") != plan.digest:
-            raise InputError("another sweep is in this folder; choose another one", str(file))
-    else:
+    if not (base / _PLAN).exists():
         write_files(base, {_PLAN: json.dumps(said, indent=1) + "\n"})
 
 

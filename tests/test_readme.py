@@ -1,13 +1,18 @@
 """README.md and the commands that pages name: tables, options, files, and the Python that is shown."""
 
 import re
+import sys
 from pathlib import Path
 
 import pytest
+from shipped import NAMES, load_shipped
 
 import parakin as pk
 from parakin.cli import app
 from parakin.units import name_display_unit
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "examples"))
+import machines_page
 
 ROOT = Path(__file__).parents[1]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
@@ -36,7 +41,7 @@ def test_the_table_of_machines_is_that_of_the_command():
             family = row[0].strip("*")
             continue
         for name in re.findall(r"`(\w+)`", row[0]):
-            machine = pk.load(name)
+            machine = load_shipped(name)
             named.append(name)
             own = next(leg for leg in machine.spec.legs).family
             assert own == family or (family == "others" and own in OTHERS), name
@@ -45,7 +50,16 @@ def test_the_table_of_machines_is_that_of_the_command():
             assert sum(int(count) for count, _ in counts) == len(machine.joints), name
             turning = sum(int(count) for count, kind in counts if kind in ("turns", "arms", "carriages", "links"))
             assert turning == sum(name_display_unit(drive.unit) == "deg" for drive in machine.drives), name
-    assert sorted(named) == sorted(pk.machines())
+    assert sorted(named) == sorted(NAMES)
+
+
+def test_the_page_of_machines_is_what_its_script_writes(monkeypatch):
+    page = (ROOT / "docs" / "machines.md").read_text(encoding="utf-8")
+    for name in ("rpr3", "five_bar_slides"):
+        assert f"{machines_page.measure_workspace(load_shipped(name))} |\n" in page
+    monkeypatch.setattr(machines_page, "measure_workspace", lambda machine: "")
+    told = machines_page.make_page([load_shipped(name) for name in NAMES])
+    assert re.sub(r"\| [\d.]+ to [\d.]+ m. \|$", "|  |", page, flags=re.M) == told
 
 
 def test_the_table_of_commands_is_that_of_the_command_line():

@@ -1,5 +1,6 @@
 """How Sphinx makes the pages of this folder: ``make docs``."""
 
+import inspect
 import re
 from pathlib import Path
 
@@ -22,16 +23,33 @@ autodoc_typehints = "none"  # the docstrings say it, with shapes and units
 autodoc_default_options = {"members": True}  # not fields: the docstring of their class describes them
 suppress_warnings = ["ref.python"]  # attributes of one name in several classes
 
+REFERENCE = (Path(__file__).parent / "reference" / "python.md").read_text(encoding="utf-8")
+LINKS = {path.rpartition(".")[2]: f":class:`~{path}`" for path in re.findall(r"autoclass:: (parakin[\w.]+)", REFERENCE)}
 FIELD = re.compile(r"^([A-Za-z_][\w, ]*?) : (.*)")
 UNDERLINE = re.compile(r"^-{3,}$")
+
+
+def link_type(annotation):
+    """Link the classes of the reference in an annotation; empty where it names none."""
+    annotation = getattr(annotation, "__forward_arg__", annotation)
+    text = annotation.__name__ if inspect.isclass(annotation) else re.sub(r"(\w+\.)+(?=\w)", "", str(annotation))
+    linked = re.sub(r"\w+", lambda word: LINKS.get(word[0], word[0]), text)
+    return linked if linked != text else ""
+
+
+def list_annotations(obj):
+    """List the annotations of a class's fields, a function's arguments, or a property."""
+    bases = reversed(obj.__mro__) if inspect.isclass(obj) else [getattr(obj, "fget", None) or getattr(obj, "func", obj)]
+    return {name: hint for base in bases for name, hint in getattr(base, "__annotations__", {}).items()}
 
 
 def write_fields_as_lists(app, what, name, obj, options, lines):
     """Write a docstring's lines of names, ``name : what it is``, as a list, and its headings as rubrics.
 
-    All lists are of parameters or fields, so the heading that says so is left out.
+    All lists are of parameters or fields, so the heading that says so is left out. Classes that they are of, and those
+    of an answer, are linked.
     """
-    written = []
+    annotations, written = list_annotations(obj), []
     for number, line in enumerate(lines):
         field = FIELD.match(line)
         following = lines[number + 1] if number + 1 < len(lines) else ""
@@ -41,13 +59,16 @@ def write_fields_as_lists(app, what, name, obj, options, lines):
             written += ["", f".. rubric:: {line}"] if line != "Parameters" else []
         elif field:
             in_list = bool(written) and written[-1].startswith(("* ", "  "))
-            written += [*([] if in_list else [""]), f"* ``{field[1]}``: {field[2]}"]
+            kind = link_type(annotations.get(field[1], ""))
+            written += [*([] if in_list else [""]), f"* ``{field[1]}``{kind and f' ({kind})'}: {field[2]}"]
         elif line.startswith("    ") and written and written[-1].startswith(("* ", "  ")):
             written.append(f"  {line.strip()}")
         else:
             if line and written and written[-1].startswith(("* ", "  ")):
                 written.append("")
             written.append(line)
+    answer = link_type(annotations.get("return", ""))
+    written += ["", f"→ {answer}"] if answer else []
     lines[:] = [re.sub(r"\|(?=\w+ \w|\w+\|)", r"\\|", line) for line in written]
 
 

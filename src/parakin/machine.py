@@ -113,8 +113,9 @@ class Machine(MachineProperties, Displayed):
         out : float64 array (..., joints) to fill, as in NumPy
 
         An angle that is free (a turning axis along the tool's) is 0; :meth:`follow` keeps the neighbour's instead.
-        Limits are not looked at: see :meth:`check`. In the papers this is (26) to (28) and (39) to (41) of FME
-        Transactions 41 (2013) for the Tricept, (6) to (11) of IJEEC 6 (2022) for Lambda legs.
+        Limits are not looked at: see :meth:`check`. In the papers this is (2) and (7) of Zivanovic (HBG80, about 2000)
+        for rods on slides, (26) to (28) and (39) to (41) of FME Transactions 41 (2013) for the Tricept, (6) to (11) of
+        IJEEC 6 (2022) for Lambda legs.
         """
         rows, lead = self.rows(poses, self.axes, "poses")
         shape = (*lead, len(self.joints))
@@ -179,7 +180,8 @@ class Machine(MachineProperties, Displayed):
             ``in_other_mode`` of the solution says
         agreement : by how much legs may fail to close, mm, where joints of more drives than freedoms disagree
 
-        Where there is no answer, ``why`` of the solution says the reason. Raises :class:`NoMethodError` for a closed
+        Where there is no answer, ``why`` of the solution says the reason. The closed form of two circles is (3) to (5)
+        of Zivanovic. Raises :class:`NoMethodError` for a closed
         form that the machine does not have.
         """
         rows, lead = self.rows(joints, self.joints, "joints")

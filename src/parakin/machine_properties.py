@@ -81,7 +81,10 @@ class MachineProperties:
 
     @property
     def direction(self) -> DirectionColumns | None:
-        """The columns of B and C in a pose where these tell the tool's axis; None where a turn about it counts too."""
+        """The columns of B and C in a pose where these tell the tool's axis; None where a turn about it counts too.
+
+        B and C of an axis are (8) and (9) of FME Transactions 41 (2013).
+        """
         return self.structure.direction
 
     @property

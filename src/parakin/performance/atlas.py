@@ -74,7 +74,8 @@ class Atlas:
 
     map : on the grid
     extremes : over the allowed positions, found by search from the grid's best
-    isotropic : (k, axes) allowed poses at which J is a multiple of a rotation
+    isotropic : (k, axes) allowed poses, mm and rad, at which J is a multiple of a rotation: (6a) and (6b) of Chablat
+        and Wenger (Chemnitz, 2000) for three rods on slides
     singularities : of each margin, whether the machine's limits keep it from zero all over, whether a path inside them
         is proved to pass through zero, or neither
     isolated : whether these stand alone; else they are samples of a curve or a surface of them

@@ -34,7 +34,7 @@ class Constraint:
     position, orientation : the inputs: d coordinates of x, mm, and those of θ, rad
     implied : it follows from others, and serves only to prove that they can't hold
     sign : proves the margin's sign over boxes of x, then θ, where the programs don't tell it
-    sign_first : it is asked before the programs, which are many times longer
+    sign_first : it is asked of large cells only, and before the programs, which then need not be made
     """
 
     name: str

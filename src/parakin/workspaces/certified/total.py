@@ -96,7 +96,7 @@ class TotalSubdivision(Subdivision):
     ) -> tuple[OrientationBoxes, LinearBounds]:
         """Bound a margin where there is one orientation, as :meth:`_bound_constraint`."""
         boxes = boxes.take(~outside[boxes.cell])
-        if self.closely and constraint.sign_first:
+        if self.closely and constraint.sign_first and not self.rounds:
             boxes = decide_signs(constraint, low, size, boxes, outside)
         bounds = bound_margin(constraint, low, size, boxes, every=True)
         if self.closely and not constraint.sign_first:

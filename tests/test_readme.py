@@ -3,12 +3,14 @@
 import re
 import sys
 from pathlib import Path
+from typing import get_args
 
 import pytest
 from shipped import NAMES, load_shipped
 
 import parakin as pk
 from parakin.cli import app
+from parakin.controllers import Hardware, Target, load_controller
 from parakin.units import name_display_unit
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "examples"))
@@ -21,9 +23,9 @@ COMMANDS = {name for name in app if not name.startswith("-")}
 OTHERS = ("columns on a circular rail", "two slides on a rail for each leg")  # families of few machines
 
 
-def read_table(heading):
-    """The rows of the table below a heading of the README."""
-    lines = README.partition(f"\n## {heading}\n")[2].partition("\n## ")[0].splitlines()
+def read_table(heading, page=README):
+    """The rows of the first table below a heading of a page."""
+    lines = page.partition(f"# {heading}\n")[2].partition("\n## ")[0].splitlines()
     return [
         [cell.strip() for cell in re.split(r"(?<!\\)\|", line.strip("|"))] for line in lines if line.startswith("|")
     ][2:]
@@ -69,6 +71,19 @@ def test_the_table_of_commands_is_that_of_the_command_line():
     for command, text in read_table("Commands"):
         known = list_options(first.pop(0)) if "--install" not in command else {"--install-completion"}
         assert {*re.findall(r"(?<![\w-])--[a-z][a-z-]+", command + text)} <= known, command
+
+
+def test_the_tables_of_controls_and_cards_are_those_of_the_code():
+    joint_programs, linuxcnc = (
+        (ROOT / "docs" / name).read_text(encoding="utf-8") for name in ("joint_programs.md", "linuxcnc.md")
+    )
+    told = {
+        row[0].strip("`"): row[2].strip("`")
+        for row in read_table("Programs for controls that know no kinematics", joint_programs)
+    }
+    assert told == {target: load_controller(target).suffix for target in get_args(Target) if target != "linuxcnc"}
+    cards = [name for row in read_table("To a real machine", linuxcnc) for name in re.findall(r"`([\w-]+)`", row[0])]
+    assert cards[: len(get_args(Hardware))] == [*get_args(Hardware)]
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)

@@ -181,8 +181,7 @@ class Machine(MachineProperties, Displayed):
         agreement : by how much legs may fail to close, mm, where joints of more drives than freedoms disagree
 
         Where there is no answer, ``why`` of the solution says the reason. The closed form of two circles is (3) to (5)
-        of Zivanovic. Raises :class:`NoMethodError` for a closed
-        form that the machine does not have.
+        of Zivanovic. Raises :class:`NoMethodError` for a closed form that the machine does not have.
         """
         rows, lead = self.rows(joints, self.joints, "joints")
         check_kind("method", method, str | None)
@@ -297,8 +296,9 @@ class Machine(MachineProperties, Displayed):
 
         Rows of legs are their closures' derivatives (a rod's vector, mm); the last two rows of a machine with driven
         head or table say that the tool's axis turns with the pose's. det A = 0 (of more drives: its rank falls) at a
-        parallel singularity or where the pose's angles are, B = 0; det B = 0 at a serial one. NaN out of reach. (3)
-        and (4) of Chablat and Wenger (Chemnitz, 2000); (30) of FME Transactions 41 is of the Tricept's legs.
+        parallel singularity or where the pose's angles are, B = 0; det B = 0 at a serial one. NaN out of reach. For the
+        Orthoglide (3) of Chablat and Wenger (Chemnitz, 2000) has both, and its first (5) and (6) say where det A = 0;
+        (30) of FME Transactions 41 is B⁻¹A of the Tricept's legs, by its platform's own coordinates.
         """
         rows, lead = self.rows(poses, self.axes, "poses")
         n, m = len(self.axes), len(self.joints)

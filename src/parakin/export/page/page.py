@@ -64,7 +64,8 @@ def render_machine_page(machine: Machine, pose: RowsLike | None = None) -> str:
     machine : its sizes, too, can be dragged on the page
     pose : (axes,) mm and rad, at which it stands at first; home by default
 
-    Raises :class:`PoseError` for a pose out of reach.
+    Raises :class:`PoseError` for a pose out of reach, :class:`NoMethodError` where the installed trimesh does not bring
+    three.js.
     """
     begin = machine.home if pose is None else machine.rows(pose, machine.axes, "pose")[0]
     if not np.isfinite(machine.inverse(begin)).all():
@@ -80,7 +81,7 @@ def render_path_page(posted: Posted, trajectory: Trajectory | None = None, numbe
     trajectory : :attr:`Job.trajectory`, by whose time it is played; without it record by record
     numbers : how many of the path the page may hold, some 5 bytes each; the fewer, the coarser are its samples
 
-    Raises :class:`PoseError` for a path without records.
+    Raises :class:`PoseError` for a path without records, and as :func:`parakin.render_machine_page` does.
     """
     if not len(posted.path):
         raise PoseError("posted: a path with records expected, this one has no motion")

@@ -70,7 +70,8 @@ class DesignProof:
             if limit >= 0:
                 return f"{containment.names[limit]} is broken at a wanted pose"
             if not containment.proved[0]:
-                return "left undecided"
+                why = "the time was up" if budget.is_spent() else f"after {int(containment.boxes[0]):,} boxes"
+                return f"limits and bounds are left undecided: {why}"
             if self.machine.is_redundant:
                 box = self._make_box(poses)[1]
                 regular = prove_no_singularity(box, "parallel", _BOXES, max(budget.seconds_left, 1e-3))

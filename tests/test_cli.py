@@ -224,7 +224,13 @@ def test_show(name, capsys, tmp_path, monkeypatch):
     assert said.splitlines()[-1] == f"-o {name}.html writes the page on which it moves"
     assert main(["show", name, "--json"]) == 0
     assert not list(tmp_path.iterdir())
-    assert json.loads(capsys.readouterr().out, parse_constant=pytest.fail)["name"] == name
+    told = json.loads(capsys.readouterr().out, parse_constant=pytest.fail)
+    assert told["name"] == name
+    assert main(["show", name, "--parameters"]) == 0
+    lines = [line.split() for line in capsys.readouterr().out.splitlines()[1:]]
+    listed = [(parameter["name"], parameter["unit"], parameter["group"]) for parameter in told["parameters"]]
+    assert listed == [(first, unit, group) for first, _, unit, group in lines]
+    assert [first for first, *_ in listed] == [parameter.name for parameter in load_shipped(name).parameters]
 
 
 @pytest.mark.parametrize(("answer", "written"), [("y", ["rpr3.html"]), ("", []), ("no", [])])

@@ -1,5 +1,8 @@
 """Families against machines made one by one: by replaced numbers, by machine files, and by differences."""
 
+import re
+import subprocess
+import sys
 import tempfile
 from dataclasses import replace
 from pathlib import Path
@@ -203,3 +206,13 @@ def test_named_sizes_are_inputs(name):
         assert np.abs(family.inverse(poses, sizes) - other.inverse(poses)).max() < 1e-9
         assert np.abs(family.at(sizes).inverse(poses) - other.inverse(poses)).max() < 1e-9
         assert np.nanmax(np.abs(family.margins(poses, sizes) - other.margins(poses))) < 1e-7
+
+
+def test_the_example_runs(tmp_path):
+    script = Path(__file__).parents[1] / "examples" / "family.py"
+    done = subprocess.run([sys.executable, script, "-o", tmp_path], capture_output=True, text=True, check=True)
+    drawn, told = map(
+        float, re.search(r"drawn: (\S+) um rms at home, the first order tells (\S+)", done.stdout).groups()
+    )
+    assert drawn == pytest.approx(told, rel=0.01)
+    assert [path.name for path in tmp_path.iterdir()] == ["family.png"]

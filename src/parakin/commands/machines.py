@@ -9,7 +9,15 @@ from typing import TYPE_CHECKING
 
 from ..errors import InputError
 from ..export.figure_file import PICTURES
-from ..export.json.machine import LOADS, MOTOR, RATES, encode_details, encode_machine, encode_machines
+from ..export.json.machine import (
+    LOADS,
+    MOTOR,
+    RATES,
+    encode_details,
+    encode_machine,
+    encode_machines,
+    encode_parameters,
+)
 from ..export.number_format import format_fixed
 from ..units import name_display_unit
 from .console import format_table, print_json, print_text
@@ -59,6 +67,7 @@ def show(
     output: OutputPath = None,
     yaml: bool = False,
     file: bool = False,
+    parameters: bool = False,
     force: bool = False,
     json: Json = False,
     sizes: Sizes = None,
@@ -77,11 +86,13 @@ def show(
         machine into, or to keep those of --set. Reading it gives the same machine, bit for bit.
     file
         Print the machine's file as it was written, with the values of --set in their places.
+    parameters
+        Print the numbers that can be inputs: free in families, designs and calibrations, and within tolerances.
     force
         Overwrite an .html that parakin did not write.
     """
-    if yaml + file + json > 1:
-        raise InputError("only one of --yaml, --file and --json, expected what to print", "show")
+    if yaml + file + parameters + json > 1:
+        raise InputError("only one of --yaml, --file, --parameters and --json, expected what to print", "show")
     machine = load_machine(name, sizes)
     if output is not None:
         _write_picture(machine, output, force)
@@ -96,6 +107,9 @@ def show(
         from ..description import find_machine_file, write_sizes
 
         print_text(write_sizes(find_machine_file(name), split_sizes(sizes)).rstrip("\n"))
+        return 0
+    if parameters:
+        print_text(_list_parameters(machine))
         return 0
     print_text(_summarise_machine(machine))
     print()
@@ -145,6 +159,13 @@ def _format_number(value: float | str | None) -> str:
 
 def _format_bound(value: float | None, unit: str) -> tuple[str, str]:
     return ("", "") if value is None else (_format_number(value), unit)
+
+
+def _list_parameters(machine: Machine) -> str:
+    rows = [
+        (own["name"], _format_number(own["value"]), own["unit"], own["group"]) for own in encode_parameters(machine)
+    ]
+    return format_table(rows, ("number", "", "", "group"), " r")
 
 
 def _summarise_machine(machine: Machine) -> str:

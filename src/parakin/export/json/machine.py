@@ -32,6 +32,7 @@ def encode_machine(machine: Machine, files: Mapping[str, str]) -> dict[str, Any]
         "schema": "parakin.show/1",
         **_encode_head(machine),
         **encode_details(machine),
+        "parameters": encode_parameters(machine),
         "files": dict(files),
     }
 
@@ -79,6 +80,19 @@ def encode_details(machine: Machine) -> dict[str, Any]:
         "limits": limits,
         "home": {axis: to_display(value, unit) for axis, value, unit in home},
     }
+
+
+def encode_parameters(machine: Machine) -> list[dict[str, Any]]:
+    """Encode the numbers of a machine that can be inputs."""
+    return [
+        {
+            "name": own.name,
+            "value": to_display(own.value, own.unit),
+            "unit": name_display_unit(own.unit),
+            "group": own.group,
+        }
+        for own in machine.parameters
+    ]
 
 
 def _encode_motor(drive: Drive) -> dict[str, Any]:

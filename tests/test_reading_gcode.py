@@ -216,9 +216,9 @@ def test_letters_that_are_never_given_are_zero(both):
 
 
 def test_no_feed_towards_the_unknown(both):
-    refused(both_error(both), "G0 X0\nG1 X1 F5\nX2\nY1\nG0 Z3\n", 2, "Y is not known", "line 4")
+    refused(both_error(both), "G0 X0\nG1 X1 F5\nX2\nY1\nG0 Z3\n", 2, "Y is not known", "line 4", "a stated start")
     refused(both_error(both), "G91 G0 X1\n", 1, "G91", "X")
     refused(both_error(both), "G0 X0 Y0\nG91 Z1\n", 2, "Z")
     refused(both_error(both), "G0 X0 Y0\nG91\nX1\nZ1\n", 4, "Z")
-    refused(both_error(both), "G2 X1 I1 F1\n", 1, "X is not known")
+    refused(both_error(both), "G2 X1 I1 F1\n", 1, "X is not known", "a stated start")
     refused(both_error(both), "G0 X0 Y0\nG2 X1 I.5 Z1 F1\n", 2, "Z is not known")

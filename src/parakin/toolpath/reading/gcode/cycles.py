@@ -77,7 +77,7 @@ class CannedCycles:
                 start[k] = value * motion.scale
         for k, value in zip((first, second, along), (*start, level + self._initial), strict=True):
             if value != value:
-                refuse(f"{name} while {AXES[k]} is not known; expected {AXES[k]} before it")
+                refuse(f"{name} while {AXES[k]} is not known; expected {AXES[k]} before it, or a stated start")
         repeats = round_whole("L", values.pop("L", 1.0))
         if not 1 <= repeats <= _MOST_REPEATS:
             refuse(f"{name} L{repeats}; expected 1 to {_MOST_REPEATS} repeats")

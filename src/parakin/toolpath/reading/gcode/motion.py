@@ -232,7 +232,7 @@ class GcodeMotion:
         """Refuse an arc that starts at unknown coordinates: the plane's two, and the third where the block names it."""
         for k in plane[:2] if AXES[plane[2]] not in named else plane:
             if self.here[k] != self.here[k]:
-                refuse(f"{name} while {AXES[k]} is not known; expected {AXES[k]} before it")
+                refuse(f"{name} while {AXES[k]} is not known; expected {AXES[k]} before it, or a stated start")
 
     def _take_centre(self, end: list[float], name: str, values: dict[str, float], named: set[str]) -> Flat:
         """Take R, or I, J and K, out of a block's values and return the arc's centre in its plane, mm."""

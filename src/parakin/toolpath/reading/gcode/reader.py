@@ -349,7 +349,9 @@ class GcodeReader:
                 if len(feeding):
                     given = int(columns[LINE, np.argmin(missing)])
                     message = f"a feed motion while {letter} is not known, which is first given in line {given}"
-                    raise self._fail(f"{message}; expected it before", int(columns[LINE, feeding[0]]))
+                    raise self._fail(
+                        f"{message}; expected it before, or a stated start", int(columns[LINE, feeding[0]])
+                    )
                 unknown |= missing
         dropped = int(np.count_nonzero(unknown))
         if dropped:

@@ -11,7 +11,7 @@ from shipped import load_shipped
 import parakin as pk
 from parakin.cli import main
 from parakin.export.position_map import LEVELS, extend_grid, fill_map, set_bar_ticks
-from parakin.export.space_axes import add_space_axes
+from parakin.export.space_axes import add_space_axes, fit_to_room
 
 COMMANDS = {
     "plane": ("workspace", "hbg80_2d", "--gap", "0.05"),
@@ -105,6 +105,17 @@ def test_short_axes_in_space_have_few_numbers():
         counts.append(sum(low <= tick <= high for tick in ticks))
     assert counts[0] >= 3
     assert counts[1] <= 2
+
+
+@pytest.mark.parametrize("half", [(600.0, 130.0, 180.0), (300.0, 300.0, 300.0), (900.0, 80.0, 900.0)])
+def test_names_of_axes_in_space_are_clear_of_their_numbers(half):
+    figure = Figure(figsize=(12.0, 6.6))
+    axes = add_space_axes(figure, np.zeros(3), np.array(half), "XYZ")
+    fit_to_room(axes, np.array(half), (0.02, 0.1, 0.6, 0.85))
+    figure.draw_without_rendering()
+    for axis in (axes.xaxis, axes.yaxis, axes.zaxis):
+        name = axis.label.get_window_extent()
+        assert not [tick for tick in axis.get_major_ticks() if name.overlaps(tick.label1.get_window_extent())]
 
 
 def test_an_outline_is_smooth_where_legs_end_to_close():

@@ -15,6 +15,7 @@ from .shaded_bodies import project
 GREY = "#607d8b"
 Room = tuple[float, float, float, float]  # left, bottom, right, top in fractions of a figure
 
+_MOVE, _FARTHEST = 3.0, 25.0  # points, by which a name moves off the numbers at a time, and in all
 _ROUNDS = 3  # names and numbers keep their size, so one round does not fit all
 
 
@@ -54,12 +55,28 @@ def fit_to_room(axes: Any, half: Array, room: Room) -> None:
     """Fit axes to their room, names and numbers within, by zoom and place; before bodies are added."""
     zoom, low, high = 1.0, np.array(room[:2]), np.array(room[2:])
     for _ in range(_ROUNDS):
+        _clear_names(axes)
         first, last = _measure(axes)
         zoom *= float(np.min((high - low) / (last - first)))
         axes.set_box_aspect(half, zoom=zoom)
         first, last = _measure(axes)
         place = axes.get_position()
         axes.set_position((*(place.min + 0.5 * (low + high - first - last)), *place.size))
+
+
+def _clear_names(axes: Any) -> None:
+    """Move the axes' names outward until each is clear of its axis' numbers."""
+    near = [axes.xaxis, axes.yaxis, axes.zaxis]
+    while near:
+        axes.figure.draw_without_rendering()
+        near = [axis for axis in near if axis.labelpad + _MOVE <= _FARTHEST and _crosses_numbers(axis)]
+        for axis in near:
+            axis.labelpad += _MOVE
+
+
+def _crosses_numbers(axis: Any) -> bool:
+    name = axis.label.get_window_extent()
+    return any(name.overlaps(tick.label1.get_window_extent()) for tick in axis.get_major_ticks() if tick.get_visible())
 
 
 def _measure(axes: Any) -> tuple[Array, Array]:

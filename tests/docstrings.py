@@ -1,5 +1,6 @@
 """What the docstrings of the library leave out, for the tests: arguments of public callables, fields of results."""
 
+import dis
 import inspect
 import re
 from collections.abc import Iterator
@@ -12,6 +13,8 @@ import parakin as pk
 MATHEMATICS = ("parakin.algebra", "parakin.kernels", "parakin.model")
 # A line of a docstring, ``name, name : what it is``, or a name in a sentence, in double backticks.
 DESCRIBED = re.compile(r"^ *([A-Za-z_]\w*(?:, \w+)*) : |``(\w+)``", re.M)
+
+VARIABLE = (inspect.Parameter.VAR_POSITIONAL, inspect.Parameter.VAR_KEYWORD)
 
 
 def find_described(text: str | None) -> set[str]:
@@ -29,7 +32,11 @@ def find_shared(kind: type) -> set[str]:
 
 
 def list_fields(kind: type) -> list[str]:
-    return [name for base in list_bases(kind) for name in inspect.get_annotations(base) if not name.startswith("_")]
+    """Public fields: those with an annotation, and what a constructor stores."""
+    names = [name for base in list_bases(kind) for name in inspect.get_annotations(base)]
+    for init in (inspect.unwrap(vars(base)["__init__"]) for base in list_bases(kind) if "__init__" in vars(base)):
+        names += [step.argval for step in dis.get_instructions(init) if step.opname == "STORE_ATTR"]
+    return [name for name in dict.fromkeys(names) if not name.startswith("_") and not hasattr(Exception, name)]
 
 
 def list_members(kind: type) -> Iterator[tuple[str, object]]:
@@ -41,7 +48,8 @@ def list_members(kind: type) -> Iterator[tuple[str, object]]:
 
 
 def list_arguments(function: object) -> list[str]:
-    return [name for name in inspect.signature(function).parameters if name not in ("self", "cls")]
+    parameters = inspect.signature(function).parameters.values()
+    return [one.name for one in parameters if one.name not in ("self", "cls") and one.kind not in VARIABLE]
 
 
 def list_named(owner: object, annotations: dict[str, object]) -> list[object]:
@@ -91,8 +99,7 @@ def find_unnamed_arguments(function: object) -> list[str]:
 def find_undescribed(kind: type) -> list[str]:
     """Fields and members that a class does not describe, and arguments that neither it nor the member names."""
     shared, own = find_shared(kind), list_fields(kind)
-    if not own and "__init__" in vars(kind):
-        own = list_arguments(kind.__init__)
+    own += list_arguments(kind.__init__) if inspect.isfunction(kind.__init__) else []
     missing = [name for name in own if name not in shared and not isinstance(vars(kind).get(name), property)]
     for name, function in list_members(kind):
         text = inspect.getdoc(getattr(kind, name)) if function.__doc__ is None else function.__doc__

@@ -35,6 +35,8 @@ _SHORTEST_DIRECTION = 1e-6  # mm or rad; travel in multiples of a shorter one ov
 class Machine(MachineProperties, Displayed):
     """A parallel kinematic machine. Made by :func:`parakin.load`; nothing of it changes after that.
 
+    spec : its description, as its file gives it
+
     Its methods share these arguments:
 
     poses, pose : rows (..., axes), or one (axes,), of :attr:`axes`, mm and rad, of the tool in the workpiece's frame:

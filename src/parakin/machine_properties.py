@@ -43,7 +43,12 @@ _SMALL_TURN = 1e-4  # rad, by which an angle is changed to see how numbers follo
 
 @check_constructor
 class MachineProperties:
-    """A machine's properties. Nothing of it changes once it is made."""
+    """A machine's properties. Nothing of it changes once it is made.
+
+    spec : its description
+    make_spec : makes the description with other sizes of its file; None for one of no file
+    model : its mathematics, for the library's own kinematics
+    """
 
     def __init__(self, spec: Spec, make_spec: SpecMaker | None = None):
         self.spec, self._make_spec = spec, make_spec

@@ -34,6 +34,11 @@ class DesignTapes:
     poses, pose : rows (..., axes), mm and rad, or scalars of one
     sizes : rows (..., k) of the free numbers, mm and rad, or scalars by their names
 
+    family : of the free numbers
+    length : by which angles are multiplied
+    scales : (n,) and (m,) what the columns of A and of B are multiplied by, so that all rates are mm
+    size : the greatest leg's length, mm
+    limits, limit_scales : names of the limits that count, and what their margins are multiplied by
     counted : numbers of the machine's limits that count, without those of drives whose ranges are fitted
     """
 

@@ -61,6 +61,7 @@ class SizeBox:
     machine : with its nominal numbers
     within : the tolerances, as for :func:`parakin.analyse_accuracy`
     poses : a set, as its methods take it
+    names, nominal, halves : of the k numbers: (k,) mm and rad, and how far each may be off, either way
     inputs : scalars that the numbers are, each with its own deviation alone, mm and rad
 
     Raises :class:`PoseError` for tolerances of no number.

@@ -41,6 +41,7 @@ class PartTimer:
     family : the machines
     path, frame : a part, and where it lies, as for :func:`parakin.prepare`
     shift : (axes,) how far the nominal machine's part is moved from there
+    checked_poses : (P, axes), mm and rad, of the path, at which limits are looked at
 
     Raises :class:`PoseError` for a path that can't be timed, or drives without accelerations.
     """

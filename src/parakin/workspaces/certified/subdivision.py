@@ -168,6 +168,10 @@ class Subdivision(ABC):
     low, high : the box's corners, (d,) mm
     orientations : low and high of the swept axes, (s,) rad each
     closely : whether signs are proved where bounds don't tell them; it is of no use in cells larger than the machine
+    finest : mm; cells that are no longer are not divided
+    decided_cells : cells proved inside, a list of groups
+    budget : of the round that runs
+    rounds : how many there were
     open_groups : undecided cells, those of each round together, so that a round copies only what it cuts
     """
 

@@ -67,6 +67,7 @@ MISTAKES = [
     ("[200 mm,", "[-3000 km,", ['m.yaml:12: range: "-3000 km": unknown unit "km", did you mean "m"?']),
     ("[200 mm,", "[-3000 m,", ['m.yaml:12: range: "-3000 m" is out of range, expected -1 km to 1 km']),
     (" 50 mm", " -50 mm", ['m.yaml:18: clearance: "-50 mm" is out of range, expected more than 0 mm, at most 1 km']),
+    (" 50 mm", " 50 mm\n  joined: [d1]", ['m.yaml:19: joined: expected the names of two joints, got "d1"']),
     ("circle: r,", "circle: -r,", ['m.yaml:11: circle: "-r" is out of range, expected more than 0 mm, at most 1 km']),
     ("circle: r,", "circle: l4,", ['m.yaml:11: circle: "l4": undefined size "l4", expected one of R, r']),
     ("0.2 * R", "0.2 * RR", ['m.yaml:5: r: "0.2 * RR": undefined size "RR", did you mean "R"?']),

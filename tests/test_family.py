@@ -140,12 +140,22 @@ def test_a_machine_a_row_costs_no_trace(monkeypatch):
     assert np.isfinite(family.inverse(machine.home, sizes)).all()
 
 
-@pytest.mark.parametrize("off", [0.05, 2.0])
-def test_struts_of_a_joint_may_differ_a_little(off):
-    """Two struts of one joint keep no clearance, in a calibrated machine neither."""
-    machine = load_shipped("hexapod")
-    other = machine.replace_parameters({"legs.strut0.foot.x": machine.legs[0].foot[0] + off})
-    assert other.limits == machine.limits
+@pytest.mark.parametrize("name", ["hexapod", "tornado_2000"])
+def test_struts_of_a_joint_go_on_meeting_there(name, tmp_path):
+    """Machines of a family keep the limits of the nominal one, whose file tells which struts share a joint."""
+    machine = load_shipped(name)
+    family = pk.family(machine, ["feet", "platform"])
+    sizes = family.nominal + np.random.default_rng(1).normal(0.0, 3.0, len(family.names))
+    other = family.at(sizes)
+    path = tmp_path / "other.yaml"
+    path.write_text(other.format_yaml())
+    with pytest.raises(pk.ParakinError, match='joined: unknown strut "strat", did you mean "strut'):
+        wrong = tmp_path / "wrong.yaml"
+        wrong.write_text(path.read_text().replace("joined: [[strut", "joined: [[strat, strut1], [strut"))
+        pk.load(wrong)
+    for each in (other, pk.load(path)):
+        assert each.limits == machine.limits
+        assert each.margins(machine.home) == pytest.approx(family.margins(machine.home, sizes), abs=1e-9)
 
 
 @pytest.mark.parametrize(

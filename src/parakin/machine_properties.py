@@ -29,7 +29,7 @@ from .model.geometric_parameters import (
     settle_offsets,
 )
 from .model.legs import Inverse, Leg
-from .model.limits import Limit, group_joints_by_leg
+from .model.limits import Limit, find_joined_struts, group_joints_by_leg
 from .model.nominal_values import SizedTrace
 from .model.rates import TwistRates, compute_twist_rates, list_closure_joints
 from .model.size_rates import SizeRates, SpecMaker, find_size_rates, list_numbers
@@ -245,9 +245,16 @@ class MachineProperties:
         home: Mapping[str, float],
         sizes: Mapping[str, float],
     ) -> Spec:
-        """Make the description with other numbers, ranges of drives and home, and then other named sizes."""
-        spec = self._replace_numbers({**values, **sizes})
-        named = {name: sizes.get(name, values.get(name, value)) for name, value in spec.sizes.items()}
+        """Make the description with other numbers, ranges of drives and home, and then other named sizes.
+
+        Struts that meet in a joint with these named sizes go on meeting there: single numbers tell how far it is off.
+        """
+        values = {**values, **sizes}
+        spec = self._replace_numbers(values)
+        if spec.limits.clearance is not None and any(name not in spec.sizes for name in values):
+            described = self._replace_numbers({name: x for name, x in values.items() if name in spec.sizes})
+            spec = replace(spec, limits=replace(spec.limits, joined=find_joined_struts(described)))
+        named = {name: values.get(name, value) for name, value in spec.sizes.items()}
         spec = replace_ranges(replace(spec, sizes=named, home={**spec.home, **home}), ranges)
         return settle_offsets(spec)
 

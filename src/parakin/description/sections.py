@@ -247,6 +247,16 @@ def _check_pair(value: object) -> object:
 _SliderName = Annotated[str, PlainValidator(_read_slider_name)]
 
 
+def _read_strut_name(value: object) -> str:
+    if not isinstance(value, YamlText):
+        raise ValueError(f"expected a strut's name, got {describe_value(value)}")
+    return str(value)
+
+
+_StrutName = Annotated[str, PlainValidator(_read_strut_name)]
+_StrutPair = Annotated[tuple[_StrutName, _StrutName], BeforeValidator(_check_pair)]
+
+
 class _GapSection(FileSection):
     where: ClassVar[str] = " in gaps"
 
@@ -269,6 +279,7 @@ class LimitsSection(FileSection):
     gaps: Annotated[list[_GapSection], ListOf] = []
     cones: Annotated[list[_ConeSection], ListOf] = []
     clearance: Extent | None = None
+    joined: Annotated[list[_StrutPair], ListOf] | None = None
 
     def build_limits(self) -> Limits:
         return Limits(
@@ -276,6 +287,7 @@ class LimitsSection(FileSection):
             tuple(Gap(*gap.between, *gap.range) for gap in self.gaps),
             tuple(Cone(c.at, c.angle, Direction(c.axis) if c.axis else None) for c in self.cones),
             self.clearance,
+            None if self.joined is None else tuple(self.joined),
         )
 
 

@@ -169,6 +169,8 @@ def _list_limits(spec: Spec) -> Iterator[str]:
         lines.append(f"    - {{at: {cone.at}, angle: {_format_quantity(cone.angle, 'rad')}{axis}}}")
     if limits.clearance is not None:
         lines.append(f"  clearance: {_format_quantity(limits.clearance, 'mm')}")
+    if limits.joined is not None:
+        lines.append(f"  joined: [{', '.join(f'[{one}, {two}]' for one, two in limits.joined)}]")
     if lines:
         yield "limits:"
         yield from lines

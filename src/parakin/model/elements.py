@@ -186,9 +186,11 @@ class Limits:
     gaps : between two sliders of one shaft
     cones : about the rods' joints
     clearance : least distance of the centre lines of two struts that hold the platform, mm; None: no limit
+    joined : pairs of struts that meet in one joint and keep no clearance; None: those whose joints lie together
     """
 
     passive: tuple[Range, ...] = ()
     gaps: tuple[Gap, ...] = ()
     cones: tuple[Cone, ...] = ()
     clearance: float | None = None
+    joined: tuple[tuple[str, str], ...] | None = None

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import combinations
+from itertools import chain, combinations
 from math import cos, inf, pi
 from typing import Literal, NamedTuple
 
@@ -29,6 +29,7 @@ from ..algebra import (
     sub,
     transpose,
 )
+from ..errors import DescriptionError, quote, suggest
 from .elements import MOTION_UNITS, Cone
 from .legs import Reach
 from .nominal_values import find_nominal_value
@@ -250,19 +251,40 @@ def list_strut_distances(
 def _list_strut_pairs(
     spec: Spec, placement: PlatformPlacement, joints: Sequence[Scalar]
 ) -> Iterator[tuple[str, _Strut, _Strut]]:
-    nearest = max(_ONE_JOINT, _ONE_BEARING * find_nominal_value(spec.limits.clearance or 0.0))
+    joined = find_joined_struts(spec)
     for one, two in combinations(_list_struts(spec, placement, joints), 2):
-        if not _share_joint(one, two, nearest):
+        if (one.name, two.name) not in joined and (two.name, one.name) not in joined:
             yield f"{one.name}-{two.name}", one, two
 
 
+def find_joined_struts(spec: Spec) -> tuple[tuple[str, str], ...]:
+    """Find the pairs of struts that meet in a joint: those that the machine's file names, else nearly equal points."""
+    ends = [(leg.drives[0].name, leg.find_fixed_joint(), leg.fixed_foot()) for leg in spec.legs]
+    for name, rod in list_rods(spec).items():
+        ends.append((name, rod.platform, rod.foot if rod.drive is None else None))
+    if spec.limits.joined is not None:
+        known = [name for name, _, _ in ends]
+        for name in chain.from_iterable(spec.limits.joined):
+            if name not in known:
+                raise DescriptionError("limits", f"joined: unknown strut {quote(name)}{suggest(name, known)}")
+        return spec.limits.joined
+    nearest = max(_ONE_JOINT, _ONE_BEARING * find_nominal_value(spec.limits.clearance or 0.0))
+    return tuple(
+        (one, two)
+        for (one, *own), (two, *other) in combinations(ends, 2)
+        if any(
+            a is not None and b is not None and norm([find_nominal_value(x) for x in sub(a, b)]) < nearest
+            for a, b in zip(own, other, strict=True)
+        )
+    )
+
+
 class _Strut(NamedTuple):
-    """A strut that holds the platform: both ends in the base frame, and its fixed joints, None where one moves."""
+    """A strut that holds the platform: both ends in the base frame, and the platform's joint, None where it moves."""
 
     name: str
     ends: tuple[Vec, Vec]
     platform: Vec | None
-    foot: Vec | None
 
 
 def _list_struts(spec: Spec, placement: PlatformPlacement, joints: Sequence[Scalar]) -> list[_Strut]:
@@ -272,23 +294,11 @@ def _list_struts(spec: Spec, placement: PlatformPlacement, joints: Sequence[Scal
     """
     rods = _compute_rods(spec, placement, joints)
     struts = [
-        _Strut(leg.drives[0].name, own[0][::-1], leg.find_fixed_joint(), leg.fixed_foot())
+        _Strut(leg.drives[0].name, own[0][::-1], leg.find_fixed_joint())
         for leg, own in zip(spec.legs, rods, strict=True)
     ]
     passive = locate_passive_rods(spec, placement, group_joints_by_leg(spec, joints))
-    for name, rod in list_rods(spec).items():
-        struts.append(_Strut(name, passive[name][::-1], rod.platform, rod.foot if rod.drive is None else None))
-    return struts
-
-
-def _share_joint(one: _Strut, two: _Strut, nearest: float) -> bool:
-    """Tell whether two struts meet in a joint, in a calibrated machine too: two bearings have no room there.
-
-    nearest : mm that their joints are at least apart if they are two
-    """
-    pairs = [(one.platform, two.platform), (one.foot, two.foot)]
-    gaps = [sub(a, b) for a, b in pairs if a is not None and b is not None]
-    return any(norm([find_nominal_value(x) for x in gap]) < nearest for gap in gaps)
+    return [*struts, *(_Strut(name, passive[name][::-1], rod.platform) for name, rod in list_rods(spec).items())]
 
 
 def compute_segment_distance(a: tuple[Vec, Vec], b: tuple[Vec, Vec]) -> Scalar:

@@ -29,7 +29,7 @@ PARTS = {
     "forces.md": [("orthoglide", False)],
     "integrator.md": [("tricept", False)],
     "machine_file.md": [("tricept", True), ("sprint_z3", True), ("orthoglide", False)],
-    "designer.md": ["glide.yaml", "glide.yaml", None],
+    "designer.md": ["glide.yaml", "glide.yaml", None, None],
 }
 
 

@@ -191,9 +191,17 @@ def test_the_command(tmp_path, capsys):
     answer = json.loads(capsys.readouterr().out)
     assert answer["made"] == 0
     assert answer["best"]["L"]["amplification"] <= 3.0
-    (tmp_path / "out" / "part-00000.parquet").write_bytes(b"x")
-    assert main(arguments) == 2
-    assert "part-00000.parquet: is no part of this sweep" in capsys.readouterr().err
+    again = subprocess.run([sys.executable, "-m", "parakin", *arguments], capture_output=True, text=True, timeout=120)
+    assert (again.returncode, again.stderr.count("Traceback")) == (0, 0)  # in a process that has written no part
+    part = tmp_path / "out" / "part-00000.parquet"
+    content = bytearray(part.read_bytes())
+    content[1000] ^= 1  # a bit of the lengths
+    for damaged in (bytes(content), b"x"):
+        part.write_bytes(damaged)
+        assert main(arguments) == 2
+        error = capsys.readouterr().err
+        assert error.splitlines()[1].startswith(f"{part}: is no part of this sweep")  # behind the remark on within
+        assert len(error.splitlines()) == 2
 
 
 @pytest.mark.parametrize(

@@ -219,7 +219,7 @@ def _write_parquet(plan: SweepPlan, limits: Sequence[str], chunk: SweepChunk) ->
         named = pa.array(np.array([*limits, None], object)[chunk.limit], pa.string())
         columns |= {"allowed": chunk.allowed, "limit": named.dictionary_encode()}
         columns |= dict(zip(plan.quantities, chunk.values.T, strict=True))
-        pq.write_table(pa.table(columns | {"keeps": chunk.keeps}), file)
+        pq.write_table(pa.table(columns | {"keeps": chunk.keeps}), file, write_page_checksum=True)
 
     return write
 
@@ -250,9 +250,11 @@ def _summarise(plan: SweepPlan, files: Sequence[Path]) -> tuple[int, dict[str, d
 def _read_part(file: Path, columns: list[str]) -> pa.Table:
     """Read the designs of a part that keep all limits and bounds."""
     import pyarrow as pa
+    import pyarrow.compute as pc
     import pyarrow.parquet as pq
 
     try:
-        return pq.ParquetFile(file).read(columns=[*columns, "keeps"]).filter(pa.compute.field("keeps")).drop(["keeps"])
+        with pq.ParquetFile(file, page_checksum_verification=True) as part:
+            return part.read(columns=[*columns, "keeps"]).filter(pc.field("keeps")).drop(["keeps"])
     except (OSError, pa.ArrowException) as error:
         raise InputError(f"is no part of this sweep, remove it: {error}", str(file)) from None

@@ -254,7 +254,7 @@ def _read_part(file: Path, columns: list[str]) -> pa.Table:
     import pyarrow.parquet as pq
 
     try:
-        with pq.ParquetFile(file, page_checksum_verification=True) as part:
-            return part.read(columns=[*columns, "keeps"]).filter(pc.field("keeps")).drop(["keeps"])
+        with pq.ParquetFile(file, page_checksum_verification=True) as reader:
+            return reader.read(columns=[*columns, "keeps"]).filter(pc.field("keeps")).drop(["keeps"])
     except (OSError, pa.ArrowException) as error:
         raise InputError(f"is no part of this sweep, remove it: {error}", str(file)) from None

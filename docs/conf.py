@@ -38,9 +38,11 @@ def link_type(annotation):
 
 
 def list_annotations(obj):
-    """List the annotations of a class's fields, a function's arguments, or a property."""
-    bases = reversed(obj.__mro__) if inspect.isclass(obj) else [getattr(obj, "fget", None) or getattr(obj, "func", obj)]
-    return {name: hint for base in bases for name, hint in getattr(base, "__annotations__", {}).items()}
+    """List the annotations of a class's fields and constructor, a function's arguments, or a property."""
+    owners = [obj.__init__, *reversed(obj.__mro__)] if inspect.isclass(obj) else [getattr(obj, "fget", obj)]
+    owners = [getattr(owner, "func", owner) for owner in owners]
+    hints = {name: hint for owner in owners for name, hint in getattr(owner, "__annotations__", {}).items()}
+    return {name: hint for name, hint in hints.items() if name != "return" or not inspect.isclass(obj)}
 
 
 def write_fields_as_lists(app, what, name, obj, options, lines):

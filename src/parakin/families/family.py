@@ -97,7 +97,7 @@ class FamilySolution:
 def make_family(machine: Machine, free: Sequence[str]) -> Family:
     """Make the family of a machine in which some of its numbers are free.
 
-    machine : whose other numbers all keep
+    machine : whose other numbers they all keep
     free : names of :attr:`Machine.parameters`, patterns such as ``legs.*.foot.*``, or groups such as ``feet``
 
     Raises :class:`PoseError` for a name that no parameter has.

@@ -16,6 +16,8 @@ from .stiffness import split_words
 if TYPE_CHECKING:
     from ..comparison.comparison import Comparison
 
+_LINE = 100  # letters, where there is no terminal
+
 
 def compare(
     names: Annotated[list[str], Parameter(completer=complete_machine)],
@@ -98,7 +100,7 @@ def _format_comparison(result: Comparison) -> str:
 
     names = [column.machine.name for column in result.columns]
     titles, *columns = zip(*[["", *names], *list_rows(result)], strict=True)
-    room = measure_line() - max(map(len, titles))
+    room = measure_line(_LINE) - max(map(len, titles))
     blocks: list[list[tuple[str, ...]]] = [[]]
     for column in columns:
         if blocks[-1] and sum(2 + max(map(len, own)) for own in (*blocks[-1], column)) > room:

@@ -18,13 +18,12 @@ from ..kernels.compile_notice import call_at_first_compilation
 if TYPE_CHECKING:
     from rich.progress import Progress as Bar
 
-_LINE = 100  # letters, where there is no terminal
 _QUIET = 1.0  # s of work before a bar appears
 
 
-def measure_line() -> int:
-    """Measure how many letters a line has: COLUMNS, or the terminal; elsewhere 100."""
-    return shutil.get_terminal_size((_LINE, 0)).columns
+def measure_line(elsewhere: int = sys.maxsize) -> int:
+    """Measure how many letters a line has: COLUMNS, or the terminal; in a file or a pipe, as it is given."""
+    return shutil.get_terminal_size((elsewhere, 0)).columns
 
 
 def format_table(rows: Sequence[Sequence[str]], header: Sequence[str], right: str = "") -> str:

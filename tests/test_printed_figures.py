@@ -18,11 +18,12 @@ COMMANDS = {
     "space": ("workspace", "linear_delta", "--gap", "0.2", "--step", "40"),
     "curves": ("workspace", "hbg80_2d", "--method", "drives"),
     "machine": ("show", "tricept"),
+    "planar machine": ("show", "rpr3"),
     "map": ("atlas", "hbg80_2d", "--step", "40"),
     "accuracy": ("accuracy", "rpr3", "--tolerance", "feet=0.05mm", "--samples", "40"),
     "stiffness": ("stiffness", "hbg80_2d", "--drives", "100N/um", "--samples", "40"),
 }
-IN_A_COLUMN = ("machine", "accuracy", "stiffness")
+IN_A_COLUMN = ("machine", "planar machine", "accuracy", "stiffness")
 SVG = "{http://www.w3.org/2000/svg}"
 
 

@@ -44,10 +44,12 @@ def set_space_axes(axes: Any, middle: Array, half: Array, names: Sequence[str]) 
 
 
 def set_tick_counts(axes: Any, most: int) -> None:
-    """Give the longest axis about so many numbers, the others as many as have room beside each other."""
+    """Give the longest axis with numbers about so many, the others as many as have room beside each other."""
     lengths = {letter: abs(float(np.ptp(getattr(axes, f"get_{letter}lim")()))) for letter in "xyz"}
     longest = max(lengths.values())
     for letter, length in lengths.items():
+        if not len(getattr(axes, f"{letter}axis").get_ticklocs()):
+            continue
         axes.locator_params(axis=letter, nbins=math.ceil(most * length / longest), min_n_ticks=1)
 
 

@@ -113,6 +113,13 @@ def test_what_can_not_be_written_is_refused(words, told, tmp_path, capsys, monke
     assert not list(tmp_path.iterdir())
 
 
+def test_a_mesh_at_a_pose_out_of_reach_is_not_written(tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert main(["export", "linear_delta", "--to", "stl", "--at", "X=9999"]) == 3
+    assert capsys.readouterr().err == "--at: out of reach: tower_a.reach\n"
+    assert not list(tmp_path.iterdir())
+
+
 @pytest.mark.parametrize("name", ["hexapod", "tricept", "lambda6", "orthoglide5_table", "hbg80_2d", "eclipse"])
 def test_a_urdf_stands_as_at_home(name, tmp_path):
     """Read by MuJoCo with its joints at home's values, the tool is at home's pose, and the loops close."""

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Literal
 from cyclopts import Parameter
 
 from ..errors import InputError
-from .console import print_json, print_text
-from .options import Json, Name, OutputPath, Sizes, load_machine, require_ending
+from .console import print_json, print_remark, print_text
+from .options import OFF_LIMITS, Json, Name, OutputPath, Sizes, load_machine, require_ending
 from .values import parse_row
 
 if TYPE_CHECKING:
@@ -78,6 +78,7 @@ def export(
         -reprapfirmware, what makes that firmware refuse a move that it does not prove.
     at
         The pose of a mesh: X=10,Z=-1400 or all values in order, mm and degrees; the rest is home's. By default home.
+        The exit code is 3, and nothing is written, where it is out of reach.
     output
         The file; by default the machine's name in this folder.
     """
@@ -88,8 +89,13 @@ def export(
     if at is not None and to not in _POSED:
         raise InputError(f"{to} has no pose, only {' and '.join(_POSED)} have one", "--at")
     pose = None if at is None else parse_row(at.split(","), machine.axes, machine.axis_units, machine.home, "--at")
+    import numpy as np
+
     from ..export.files import write_files
 
+    if pose is not None and not np.isfinite(machine.inverse(pose)).all():
+        print_remark(f"--at: out of reach: {machine.limits[int(machine.check(pose)) - 1]}")
+        return OFF_LIMITS
     files = _render(machine, to, output, pose)
     write_files(output.parent, files)
     written = {"loops" if name != output.name else to: str(output.parent / name) for name in files}

@@ -426,6 +426,32 @@ def test_a_part_is_placed(tmp_path, browser):
         assert (read_column(tab, "poses").reshape(-1, 3) == before).all()
 
 
+@needs_chromium
+def test_a_placed_part_counts_turns_as_posting_does_and_passes_no_singularity(tmp_path, browser):
+    parts = {"tricept": "G1 C500 F8000\nX120", "hbg80_2d": "G1 X252.12 Y218.36 F600"}
+    starts = {"tricept": "X100 Y0 Z-1500 B20 C0", "hbg80_2d": "X207.88 Y241.64"}
+    with open_tab(browser) as tab:
+        for name, cut in parts.items():
+            part, page = tmp_path / f"{name}.ngc", tmp_path / f"{name}.html"
+            part.write_text(f"G21 G90 G94\nG0 {starts[name]}\n{cut}\nM2\n")
+            assert main(["page", str(part), "-m", name, "-o", str(page)]) == 0
+            machine = load_shipped(name)
+            width = len(machine.joints)
+            tab.goto(page.as_uri())
+            before = read_column(tab, "joints").reshape(-1, width)
+            shift = [0.001, 0, 0] if name == "tricept" else [137.68, -72.47, 0]
+            tab.evaluate(f"parakin.movePath({shift})")
+            if name == "tricept":  # theta1 begins half a turn back, so that all its turns have room
+                assert read_column(tab, "joints").reshape(-1, width) == pytest.approx(before, abs=1e-3)
+                assert tab.evaluate("parakin.placing.broken") == 0
+            else:
+                poses = read_column(tab, "poses").reshape(-1, 2)
+                sides = np.sign(machine.sides(poses))
+                assert (machine.check(poses) == 0).all()
+                assert 0 < (sides != sides[0]).sum() < len(sides)
+                assert tab.evaluate("parakin.placing.broken") == pytest.approx((sides != sides[0]).sum(), abs=2)
+
+
 # Of the curves: how many gaps end beside a sample that has joints, and how many dots are inked between the two.
 INK_IN_GAPS = """() => {
   const canvas = document.getElementById("curves"), pen = canvas.getContext("2d");

@@ -17,24 +17,12 @@ const MOST_DRAGGED = 350; // samples that are found again while the part is drag
 // Move the path from where it was posted, mm, and find again what its samples ask of the machine: of all of them, or
 // while it is dragged of every few, which stand for those after them.
 function movePath(shift, stride = 1) {
-  const number = machine.axes.length, count = machine.joints.length, still = shift.every(value => value === 0);
-  const moves = machine.axes.map(axis => "XYZ".includes(axis.name) ? shift["XYZ".indexOf(axis.name)] : 0);
-  const {poses, joints, margins, broken} = pathColumns;
   for (const [name, values] of Object.entries(posted)) pathColumns[name].set(values);
-  let before = stateAtPose(everyHome(), path.signs, null);
-  for (let i = 0; i < path.samples && !still; i++) {
-    const pose = rowOf("poses", i, number).map((value, k) => value + moves[k]);
-    poses.set(pose, i * number);
-    if (i % stride) {
-      joints.set(rowOf("joints", i - 1, count), i * count);
-      [margins[i], broken[i]] = [margins[i - 1], broken[i - 1]];
-      continue;
-    }
-    const state = stateAtPose(pose, path.signs, before), own = state ? marginsAt(state) : [];
-    joints.set(state ? state.joints : Array(count).fill(NaN), i * count);
-    margins[i] = state ? measureRoom(own) : NaN;
-    broken[i] = !state || findBroken(own) >= 0 ? 1 : 0;
-    before = state ?? before;
+  const still = shift.every(value => value === 0), {broken} = pathColumns;
+  if (!still) {
+    const states = followSamples(machine.axes.map(axis => "XYZ".includes(axis.name) ? shift["XYZ".indexOf(axis.name)] : 0), stride);
+    fitTurns(states.filter(state => state));
+    writeSamples(states, stride);
   }
   Object.assign(placing, {shift: [...shift], broken: broken.reduce((sum, value) => sum + value, 0)});
   curveBounds = null;
@@ -44,6 +32,52 @@ function movePath(shift, stride = 1) {
   drawLegend();
   seek(player.time);
   showPlace();
+}
+
+// Move the samples' poses. Returns the states of every few, null out of reach. Turns go on by the steps that they take
+// as posted: where they begin, where they are rewound, and over a pole.
+function followSamples(moves, stride) {
+  const number = machine.axes.length, count = machine.joints.length, states = [];
+  let before = stateAtPose(everyHome(), path.signs, null).joints, from = null;
+  for (let i = 0; i < path.samples; i++) {
+    const pose = rowOf("poses", i, number).map((value, k) => value + moves[k]);
+    pathColumns.poses.set(pose, i * number);
+    if (i % stride) continue;
+    const own = Array.from(posted.joints.subarray(i * count, (i + 1) * count));
+    const near = from ? before.map((q, k) => q + own[k] - from[k]) : own;
+    const state = stateAtPose(pose, path.signs, {joints: isFinitePose(near) ? near : before});
+    states.push(state);
+    if (state) [before, from] = [state.joints, own];
+  }
+  return states;
+}
+
+// Turn the joints of all states by whole turns into their ranges, where there they have room, as posting does.
+function fitTurns(states) {
+  machine.joints.forEach((joint, k) => {
+    if (!isTurning[k] || joint.low === null || joint.high === null || !states.length) return;
+    const [low, high] = states.reduce(([a, b], {joints}) => [min(a, joints[k]), max(b, joints[k])], [Infinity, -Infinity]);
+    if (low >= joint.low && high <= joint.high) return;
+    const turns = Math.round((joint.low + joint.high - low - high) / (2 * TURN));
+    for (const {joints} of states) joints[k] += turns * TURN;
+  });
+}
+
+// Write what the states of every few samples ask of the machine; those on the other side of a singularity are broken.
+function writeSamples(states, stride) {
+  const count = machine.joints.length, {joints, margins, broken} = pathColumns, first = states.find(state => state);
+  const side = first ? measureSide(first) : NaN;
+  for (let i = 0; i < path.samples; i++) {
+    if (i % stride) {
+      joints.set(rowOf("joints", i - 1, count), i * count);
+      [margins[i], broken[i]] = [margins[i - 1], broken[i - 1]];
+      continue;
+    }
+    const state = states[i / stride], own = state ? marginsAt(state) : [];
+    joints.set(state ? state.joints : Array(count).fill(NaN), i * count);
+    margins[i] = state ? measureRoom(own) : NaN;
+    broken[i] = !state || findBroken(own) >= 0 || measureSide(state) * side < 0 ? 1 : 0;
+  }
 }
 
 // The option that puts the part where the path lies now.

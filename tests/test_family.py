@@ -162,6 +162,10 @@ def test_struts_of_a_joint_go_on_meeting_there(name, tmp_path):
     ("call", "message"),
     [
         (lambda m: pk.family(m, ["legs.d9.foot.x"]), 'free: unknown "legs.d9.foot.x", did you mean "legs.d'),
+        (
+            lambda m: pk.family(m, ["Q"]),
+            "a group (encoders, feet, head, platform, sizes); Machine.parameters lists all",
+        ),
         (lambda m: pk.family(m, "feet"), "free: a list of a text expected"),
         (lambda m: pk.family(m, ["feet"]).inverse(m.home, [1.0]), "sizes: shape (..., 9)"),
         (lambda m: pk.family(m, ["feet"]).inverse(m.home, {"legs.d1.foot.x": "3"}), "needs a unit"),

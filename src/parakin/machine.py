@@ -12,7 +12,7 @@ from .algebra import Scalar, Vec
 from .arguments import RowsLike, bound_angles, check_kind, check_range, read_rows, warn_of_wide_angles
 from .arrays import Array, AxisRange
 from .displays import Displayed
-from .errors import NoMethodError, PoseError, quote, suggest
+from .errors import NoMethodError, PoseError, quote
 from .kernels.batch import evaluate_tape, evaluate_tape_with_residual
 from .kinematics.assemblies import Assemblies, find_assemblies
 from .kinematics.assembly_side import find_sides
@@ -26,6 +26,7 @@ from .kinematics.tapes import KinematicTapes, collect_tapes
 from .kinematics.travel import LineTapes, Travel, compile_line_tapes, find_travel
 from .kinematics.wrist.pole_thresholds import EXACT
 from .machine_properties import MachineProperties
+from .model.geometric_parameters import suggest_parameter
 from .model.limits import compute_platform_points
 from .model.structures import PlatformPlacement
 
@@ -68,7 +69,7 @@ class Machine(MachineProperties, Displayed):
         known = [parameter.name for parameter in self.parameters]
         for name in values:
             if name not in known:
-                raise PoseError(f"parameters: unknown {quote(name)}{suggest(name, known)}")
+                raise PoseError(f"parameters: unknown {quote(name)}{suggest_parameter(name, self.parameters)}")
         make_spec = partial(self._make_other_spec, values, ranges or {}, home or {})
         return Machine(make_spec({}), make_spec)
 

@@ -10,6 +10,7 @@ from ..description.document import Value, YamlList, YamlMap, YamlText, read_docu
 from ..description.importing.configuration_text import check_beside
 from ..description.values import is_word
 from ..errors import InputError, InputErrors, PoseError, quote, suggest
+from ..model.geometric_parameters import suggest_parameter
 from ..units import ANGLE, AXIS_UNITS, LENGTH, QuantityError, QuantityKind, parse_quantity
 from .options import YAML_ENDINGS, load_machine
 
@@ -88,7 +89,10 @@ class _ProblemReader:
 
         machine = self._load(self.read_text(top["machine"], "machine"))
         numbers = {p.name: ANGLE if p.unit == "rad" else LENGTH for p in machine.parameters}
-        free = self.read_map(top["free"], "free", tuple(numbers))
+        free = self.read_map(top["free"], "free")
+        for name in free:
+            if name not in numbers:
+                raise self.fail(f"free: unknown {quote(name)}{suggest_parameter(name, machine.parameters)}", name)
         shift = self.read_map(top["shift"], "shift") if "shift" in top else {}
         bounds = (
             self.read_map(top["bounds"], "bounds", tuple(name for name in WANTS if WANTS[name].bounded))

@@ -12,14 +12,14 @@ import numpy as np
 from ..algebra import Scalar, derivative
 from ..arguments import RowsLike, check_arguments, check_constructor, read_rows
 from ..arrays import Array
-from ..errors import PoseError, quote, suggest
+from ..errors import PoseError, quote
 from ..kernels.batch import NEVER, NewtonSteps, evaluate_tape, solve_by_newton
 from ..kernels.tape import NewtonTapes, Tape, compile_tape
 from ..kinematics.closure_roots import MOST_STEPS, list_step_caps
 from ..kinematics.tall_matrices import invert_from_left
 from ..machine import Machine
 from ..model.equations import Equations
-from ..model.geometric_parameters import SIZES, Parameter
+from ..model.geometric_parameters import SIZES, Parameter, suggest_parameter
 from ..model.nominal_values import SizedTrace
 
 _OTHER_MODE = 1e-4  # of the greatest leg: by which joints of another working mode differ
@@ -115,8 +115,8 @@ def select_parameters(machine: Machine, patterns: Sequence[str], argument: str =
     for pattern in patterns:
         names = {p.name for p in known if fnmatchcase(p.name, pattern) or p.group == pattern}
         if not names:
-            words = [p.name for p in known] + sorted({p.group for p in known})
-            raise PoseError(f"{argument}: unknown {quote(pattern)}{suggest(pattern, words)}")
+            others = suggest_parameter(pattern, known, with_groups=True)
+            raise PoseError(f"{argument}: unknown {quote(pattern)}{others}")
         chosen |= names
     return tuple(p for p in known if p.name in chosen)
 

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
+from difflib import get_close_matches
 from typing import Any, get_type_hints
 
 from ..algebra import Scalar, Vec, add, cross, dot, norm, scale, sub
@@ -16,6 +17,7 @@ from .structures import make_structure
 
 SIZES = "sizes"  # the group of the named sizes of a machine file
 _AXES = ("x", "y", "z")
+_NEAREST, _LONGEST_NAME = 3, 40  # of names that are told, and letters that are compared
 _TRIAL = 1e-3  # mm or rad, by which a fixed transform is changed to see whether the machine stays one
 _GROUPS = {"foot": "feet", "pivot": "feet", "platform": "platform"}  # of points; sizes and directions follow their type
 
@@ -88,6 +90,16 @@ def _list_steps(spec: Spec, key: str) -> Iterator[Parameter]:
         except DescriptionError:
             continue
         yield Parameter(name, MOTION_UNITS[step.axis], step.value, key)
+
+
+def suggest_parameter(name: str, known: Sequence[Parameter], with_groups: bool = False) -> str:
+    """Complete a message on an unknown parameter: the nearest few, groups where they may stand, and what lists all."""
+    names = [parameter.name for parameter in known]
+    nearest = get_close_matches(name[:_LONGEST_NAME], names, _NEAREST, 0.0)
+    groups = sorted({parameter.group for parameter in known}) if with_groups else []
+    others = f", a pattern, or a group ({', '.join(groups)})" if groups else ""
+    others = f"a name such as {', '.join(nearest)}{others}; Machine.parameters lists all {len(names)}"
+    return suggest(name, [*groups, *nearest], others)
 
 
 def replace_parameters(spec: Spec, values: Mapping[str, Scalar]) -> Spec:

@@ -58,6 +58,12 @@ class MachineSprings(NamedTuple):
     drives: Array
     struts: Struts
 
+    def __repr__(self) -> str:
+        of_section = "of a section" if isinstance(self.struts, Section) else f"of {self.struts} N/mm"
+        struts = "rigid" if self.struts is None else of_section
+        soft = np.count_nonzero(self.drives)
+        return f"<parakin springs: {soft} of {len(self.drives)} drives give way, struts {struts}>"
+
 
 class Spring(NamedTuple):
     """A spring at a pose; scalars of any kind.

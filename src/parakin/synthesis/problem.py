@@ -14,6 +14,7 @@ from ..arrays import Array, AxisRange
 from ..errors import PoseError, quote, suggest
 from ..families.family import Family
 from ..machine import Machine
+from ..model.geometric_parameters import suggest_parameter
 from ..toolpath.path import ToolPath
 from ..units import LONGEST, name_display_unit, to_display
 from .design_tapes import DesignTapes
@@ -90,7 +91,7 @@ class DesignProblem:
         known = [parameter.name for parameter in self.machine.parameters]
         for name in self.free:
             if name not in known:
-                raise PoseError(f"free: unknown {quote(name)}{suggest(name, known)}")
+                raise PoseError(f"free: unknown {quote(name)}{suggest_parameter(name, self.machine.parameters)}")
         for what, ranges in (("free", self.free), ("shift", self.shift)):
             for name, (low, high) in ranges.items():
                 if not (isfinite(low) and isfinite(high) and low < high):

@@ -25,6 +25,9 @@ class ForceRows(NamedTuple):
     along: Array
     across: Array
 
+    def __repr__(self) -> str:
+        return f"<parakin force rows: {len(self.along)} with {len(self.drive)} bounds>"
+
 
 def make_unforced_rows(rows: int) -> ForceRows:
     """Make the bounds of rows whose drives may give any force."""
@@ -45,6 +48,9 @@ class JointRows(NamedTuple):
     curvature: Array
     feed_ceiling: Array
     forces: ForceRows
+
+    def __repr__(self) -> str:
+        return f"<parakin joint rows: {len(self.joints)} of {self.joints.shape[1]} joints>"
 
 
 class PathState(NamedTuple):

@@ -1,4 +1,4 @@
-"""How machines, workspaces and jobs show themselves in a notebook: the page, in a frame, or the picture."""
+"""How machines, workspaces and jobs show themselves in a notebook: the page, in a frame."""
 
 from __future__ import annotations
 
@@ -11,7 +11,8 @@ if TYPE_CHECKING:
     from .workspaces.certified.workspace import Workspace
 
 _HEIGHT = 560  # px
-_SECONDS = 10.0  # for a picture
+_SECONDS = 10.0  # for a surface
+_STEPS = {2: 100, 3: 36}  # of an area and of a surface along the longest edge: a page is to stay small
 
 
 def format_machine(machine: Machine) -> str:
@@ -29,13 +30,15 @@ def format_job(job: Job) -> str:
 
 
 def format_workspace(workspace: Workspace) -> str | None:
-    """Format a workspace as its picture; none for a line, or where there is no time for one."""
-    from .export.workspace.workspace_files import explain_unfit, prepare_files
+    """Format a workspace as its machine's page with its surface; none for a line, or where there is no time for one."""
+    from .export.page.page import render_workspace_page
+    from .workspaces.sampled.distance_field import sample_field
 
-    if explain_unfit(".svg", "certified", len(workspace.axes)):
+    if workspace.box is None or len(workspace.axes) == 1:
         return None
-    picture = prepare_files(workspace, None, lambda done: None, _SECONDS).make_file(".svg")
-    return f"<p>{escape(repr(workspace)[1:-1])}</p>\n{picture.decode()}"
+    step = float((workspace.box[1] - workspace.box[0]).max()) / _STEPS[len(workspace.axes)]
+    field = sample_field(workspace.region, workspace.box, step, seconds=_SECONDS)
+    return f"<p>{escape(repr(workspace)[1:-1])}</p>\n{_embed_page(render_workspace_page(field))}"
 
 
 def _embed_page(page: str) -> str:

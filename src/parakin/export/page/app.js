@@ -35,6 +35,7 @@ new ResizeObserver(fitCanvas).observe(canvas.parentElement);
 update();
 if (path) widenView(pathLine.geometry);
 resetOrbit();
+if (proved) showSurface(unpackSurface(proved));
 fitCanvas();
 
 // Where the picture shows the tip, and the middle of a drive's strut, in pixels of the window.
@@ -53,5 +54,6 @@ window.parakin = {
   moveToPose, moveToJoints, moveToSizes, listOwnSizes, switchSign, showNextAssembly, searchAssemblies, goHome, showSurface, showValues, showBox, setPlaying,
   arrowInPicture: axis => findInPicture(arrows.localToWorld(new THREE.Vector3().setComponent(axis, 0.9))),
   tipInPicture: () => findInPicture(handle.position), strutInPicture: drive => findInPicture(findStrut(drive)),
+  shownCorners: () => Array.from(shownMesh.geometry.attributes.position.array),
   get state() { return current; }, get stoppedBy() { return stoppedBy; }, get pictures() { return pictureCount; },
 };

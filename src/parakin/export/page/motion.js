@@ -3,7 +3,7 @@
 const SAMPLES = 24, BISECTIONS = 30;
 const everyHome = () => machine.axes.map(axis => axis.home);
 let homeSide = measureSide(stateAtPose(everyHome(), machine.mode, null));
-let current = stateAtPose(begin, machine.mode, null);
+let current = stateAtPose(begin, signs ?? machine.mode, null);
 const options = {stops: true};
 let stoppedBy = null; // why the last move ended early, as text
 const listeners = [];

@@ -17,11 +17,13 @@ from ...machine import Machine
 from .machine_data import encode_page_machine
 from .model_script import write_model
 from .path_data import encode_page_path
+from .surface_data import encode_page_surface
 from .three_script import read_three_script
 
 if TYPE_CHECKING:
     from ...toolpath.posting.posted import Posted
     from ...toolpath.timing import Trajectory
+    from ...workspaces.sampled.distance_field import SampledField
 
 CORE = ("linear_algebra", "kinematics")
 APP = (
@@ -70,7 +72,36 @@ def render_machine_page(machine: Machine, pose: RowsLike | None = None) -> str:
     begin = machine.home if pose is None else machine.rows(pose, machine.axes, "pose")[0]
     if not np.isfinite(machine.inverse(begin)).all():
         raise PoseError("pose: one within reach expected")
-    return _render_page(machine, " ".join(machine.spec.title.split()) or machine.name, begin.ravel().tolist(), None)
+    return _render_page(machine, _name_page(machine), {"begin": begin.ravel().tolist()})
+
+
+def _name_page(machine: Machine) -> str:
+    """Name a machine as its file does, on one line."""
+    return " ".join(machine.spec.title.split()) or machine.name
+
+
+@check_arguments
+def render_workspace_page(field: SampledField) -> str:
+    """Render such a page with the surface of a workspace, in its mode, at its orientation.
+
+    field : of :func:`parakin.sample_field`, over two or three positions
+
+    Raises :class:`PoseError` for an empty field, and as :func:`parakin.render_machine_page` does.
+    """
+    region, machine = field.region, field.region.machine
+    if not len(field.inside):
+        raise PoseError("field: a workspace that is not empty expected")
+    places = region.home_position, field.low + field.inside[len(field.inside) // 2] * field.step
+    pose = machine.home.copy()
+    for axis, value in region.fixed_axes.items():
+        pose[machine.axes.index(axis)] = value
+    for place in places:  # home, or where there is none a place inside
+        pose[[machine.axes.index(axis) for axis in region.free_axes]] = place
+        if machine.check(pose, mode=region.mode) == 0:
+            break
+    signs = [1 if sign == "+" else -1 for sign in region.mode]
+    given = {"begin": pose.tolist(), "signs": signs, "proved": encode_page_surface(field)}
+    return _render_page(machine, f"Workspace of {_name_page(machine)}", given)
 
 
 @check_arguments
@@ -86,14 +117,14 @@ def render_path_page(posted: Posted, trajectory: Trajectory | None = None, numbe
     if not len(posted.path):
         raise PoseError("posted: a path with records expected, this one has no motion")
     path = encode_page_path(posted, trajectory, numbers)
-    title = f"{path['source']} on {' '.join(posted.machine.spec.title.split()) or posted.machine.name}"
-    return _render_page(posted.machine, title, posted.machine.home.tolist(), path)
+    title = f"{path['source']} on {_name_page(posted.machine)}"
+    return _render_page(posted.machine, title, {"begin": posted.machine.home.tolist(), "path": path})
 
 
-def _render_page(machine: Machine, title: str, begin: list[float], path: dict[str, Any] | None) -> str:
+def _render_page(machine: Machine, title: str, given: dict[str, Any]) -> str:
+    """Render the page of a machine that begins with what is given: a pose, a mode, a path, a surface."""
     what = f"{machine.name}: axes {' '.join(machine.axes)}, joints {' '.join(machine.joints)}"
-    given = {"begin": begin, "path": path}
-    data = f"const {{begin, path}} = {json.dumps(given, separators=(',', ':'), allow_nan=False)};\n"
+    data = f"const {{begin, signs, path, proved}} = {json.dumps(given, separators=(',', ':'), allow_nan=False)};\n"
     return Template(_read_text("page.html")).substitute(
         mark=_MARK,
         title=escape(title),

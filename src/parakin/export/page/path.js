@@ -1,6 +1,6 @@
 // The tool path of a posted part: its line, coloured by what counts, and its samples over time.
 
-const decodeColumn = text => new Float32Array(Uint8Array.from(atob(text), letter => letter.charCodeAt(0)).buffer);
+const decodeColumn = text => new Float32Array(decodeBytes(text));
 const pathColumns = path && Object.fromEntries(Object.entries(path.columns).map(([name, text]) => [name, decodeColumn(text)]));
 const player = {time: 0, playing: false, speed: 1, colours: "margin"};
 const pathLine = new THREE.Line(new THREE.BufferGeometry(), new THREE.LineBasicMaterial({vertexColors: true}));

@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
 
-from .leash import PATIENCE
+from .parent_watch import PATIENCE
 
 _AT_ONCE = 2
 _LONGEST = 900.0  # s
@@ -59,7 +59,7 @@ class RunQueue:
     def __init__(self) -> None:
         self._slots = asyncio.Semaphore(_AT_ONCE)
         self._tasks: dict[int, asyncio.Task[None]] = {}
-        self._leash, self._end = os.pipe()  # whose end closes with this process, for what it began to see
+        self._watched, self._held = os.pipe()  # what this process holds closes with it, and what it began sees that
 
     def begin(self, words: Sequence[str], folder: Path, columns: int) -> Run:
         """Begin a command in a folder, when there is room; it prints for lines of so many letters."""
@@ -95,9 +95,9 @@ class RunQueue:
             self._tasks.pop(id(run), None)
 
     async def _run_process(self, run: Run) -> None:
-        begin = ["-P", "-m", "parakin.studio.leash", str(self._leash)]  # -P: a file in the folder is no module
+        begin = ["-P", "-m", "parakin.studio.parent_watch", str(self._watched)]  # -P: a file in the folder is no module
         process = await asyncio.create_subprocess_exec(
-            sys.executable, *begin, "parakin", *run.words, pass_fds=[self._leash],
+            sys.executable, *begin, "parakin", *run.words, pass_fds=[self._watched],
             cwd=run.folder, stdin=asyncio.subprocess.DEVNULL, stdout=asyncio.subprocess.PIPE,
             stderr=asyncio.subprocess.PIPE, start_new_session=True,
             env={**os.environ, "COLUMNS": str(run.columns), "NO_COLOR": "1", "PYTHONPATH": _find_import_path()},

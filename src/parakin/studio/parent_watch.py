@@ -1,6 +1,6 @@
-"""``python -m parakin.studio.leash PIPE MODULE WORDS...``: run a module that ends when the other end of a pipe closes.
+"""``python -m parakin.studio.parent_watch PIPE MODULE WORDS...``: run a module that ends when its parent does.
 
-The system closes a process's pipes however it ends, so that what it began ends too where it was killed.
+The system closes a process's pipes however it ends, so that the other end tells where it was killed, too.
 """
 
 from __future__ import annotations

@@ -204,6 +204,38 @@ def test_a_driven_link_of_more_drives_than_freedoms_is_taken_by_its_name(pages, 
         assert abs(tab.evaluate("parakin.state.joints[6]") - before) > 1e-4
 
 
+DRAG_DRIVES = """shares => {
+  const {machine} = parakin, inverse = window.stateAtPose, results = [];
+  machine.joints.forEach(({unit}, drive) => {
+    for (const share of shares) {
+      let count = 0;
+      parakin.goHome();
+      window.stateAtPose = (...given) => { count += 1; return inverse(...given); };
+      const goal = parakin.state.joints.map((q, i) => i === drive ? q + share * (unit === "rad" ? 1 : machine.size) : q);
+      parakin.moveToJoints(goal);
+      window.stateAtPose = inverse;
+      const {pose, joints} = parakin.state;
+      results.push({count, pose, joints, off: joints[drive] - goal[drive], stopped: parakin.stoppedBy});
+    }
+  });
+  return results;
+}"""
+
+
+@needs_chromium
+def test_each_of_more_drives_than_freedoms_goes_where_it_is_dragged(pages, browser):
+    """The others follow, in so few steps that no picture is late: an inverse takes 2 us on the page."""
+    with open_tab(browser) as tab:
+        tab.goto(pages("eclipse_overactuated"))
+        results = tab.evaluate(DRAG_DRIVES, [-0.2, -0.1, 0.002, 0.2])
+    assert len(results) == 32
+    assert {one["stopped"] for one in results} == {None, "c1.platform", "c2.platform", "c3.platform"}
+    assert all((one["stopped"] is None) == (abs(one["off"]) < 1e-9) for one in results)
+    joints = pk.load("eclipse_overactuated").inverse([one["pose"] for one in results])
+    assert joints == pytest.approx(np.array([one["joints"] for one in results]), abs=1e-6)
+    assert 100 < max(one["count"] for one in results) < 6000
+
+
 @needs_chromium
 def test_names_that_meet_are_placed_below_each_other(browser):
     """Also where a line more is rounded to less than a line."""

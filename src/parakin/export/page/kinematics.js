@@ -72,7 +72,8 @@ function compareJoints(one, other) {
 const FOLLOWS = 1e-3, DIFFERENCE = 1e-4; // what their ways count; mm between poses that tell rates, a turn on the size
 const SETTLED = 1e-4; // mm: a step as small as this is the last where steps do not become smaller quickly
 
-// The state whose joints are those given in the least squares, from one next to it; null where none is found.
+// The state whose joints are those given in the least squares, from one next to it; those that follow are bound to no value, but
+// move as little as they can in each step, whereby few steps are needed. Null where none is found.
 function settleJoints(state, joints, counts) {
   const n = machine.axes.length, arms = machine.axes.map(axis => axis.unit === "rad" ? 1 / machine.size : 1);
   const weighs = machine.joints.map((joint, i) => counts[i] * (isTurning[i] ? machine.size : 1));
@@ -83,7 +84,7 @@ function settleJoints(state, joints, counts) {
     if (columns.flat().includes(null)) return null;
     const slopes = weighs.flatMap((weight, i) =>
       columns.map(([below, above]) => weight * (above.joints[i] - below.joints[i]) / (2 * DIFFERENCE)));
-    const off = weighs.map((weight, i) => weight * (here.joints[i] - joints[i]));
+    const off = weighs.map((weight, i) => counts[i] === FOLLOWS ? 0 : weight * (here.joints[i] - joints[i]));
     const {x} = solveLeastSquares(slopes, off, n), most = max(...x.map(abs));
     if (!Number.isFinite(most)) return null;
     const shrink = min(1, machine.size / 6 / most);

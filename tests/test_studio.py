@@ -365,9 +365,14 @@ def test_the_page_in_a_browser(studio):
         tab.evaluate("document.querySelector('aside').style.width = ''")
         page = tab.frames[1]
         tab.click("text=Largest box")
+        wait_until(tab, "/ --at=C=5.729578 .*--box/.test(document.querySelector('.run code').textContent)")
+        page.evaluate("parakin.moveToPose([0, 0, -0.1])")  # while it runs
         wait_until(page, "parakin.shown.box !== null", 40.0)
+        assert page.evaluate("parakin.shown.visible") == [False, False, False]
+        page.evaluate("parakin.moveToPose([10, -5, 0.1])")
+        assert page.evaluate("parakin.shown.visible") == [False, True, False]
         (low, high) = page.evaluate("parakin.shown.box")
-        assert not pk.load("rpr3").check([[x, y, 0.0] for x in (low[0], high[0]) for y in (low[1], high[1])]).any()
+        assert not pk.load("rpr3").check([[x, y, 0.1] for x in (low[0], high[0]) for y in (low[1], high[1])]).any()
         tab.click("button:has-text('Atlas')")
         wait_until(page, "parakin.shown.values > 20", 40.0)
         assert "1/condition number, violet 0 to yellow 1" in page.locator("aside").inner_text()
@@ -433,14 +438,14 @@ def test_the_page_in_a_browser(studio):
 
 
 PRESSED = [
-    ["workspace", {"--gap": "0.3", "--output": ["workspace_own.svg"]}],
-    ["workspace", {"--box": True, "--output": ["box_own.json"]}],
-    ["atlas", {"--output": "atlas_own"}],
-    ["post", {"PART": "part.apt", "--page": True, "--output": "on_own"}],
-    ["post", {"PART": "part.apt", "--page": True, "--output": "on_own", "--place": "200mm"}],
-    ["post", {"PART": "part.apt", "--page": True, "--output": "on_own", "--workpiece": "X=10,Y=-5"}],
+    ["workspace", {"--gap": "0.3", "--output": ["workspace_rrr3.svg"], "--at": "C=5.729578", "--mode": "-++"}],
+    ["workspace", {"--box": True, "--output": ["box_rrr3.json"], "--at": "C=5.729578", "--mode": "-++"}],
+    ["atlas", {"--output": "atlas_rrr3", "--at": "C=5.729578", "--mode": "-++"}],
+    ["post", {"PART": "part.apt", "--page": True, "--output": "on_rrr3"}],
+    ["post", {"PART": "part.apt", "--page": True, "--output": "on_rrr3", "--place": "200mm"}],
+    ["post", {"PART": "part.apt", "--page": True, "--output": "on_rrr3", "--workpiece": "X=10,Y=-5"}],
     ["compare", {"--part": "part.apt", "--output": "compared.html"}],
-    ["linuxcnc", {"--output": "linuxcnc_own"}],
+    ["linuxcnc", {"--output": "linuxcnc_rrr3"}],
 ]
 FOCUSED = "(e => e.id || e.textContent)(document.activeElement)"
 
@@ -465,13 +470,13 @@ def press_all(tab):
         wait_until(tab, f"document.querySelector('#runs p.bad')?.textContent === 'not now {number}'")
     tab.keyboard.press("Tab")
     assert tab.evaluate(FOCUSED) == "Any command"
-    tab.select_option("#second", "rrr3")  # which begins a run of its page
+    tab.select_option("#second", "own.yaml")  # which begins a run of its page
     wait_until(tab, f"document.querySelector('#runs p.bad').textContent === 'not now {len(PRESSED) + 1}'")
     tab.click("#quick button:text-is('Compare')")
     wait_until(tab, f"document.querySelector('#runs p.bad').textContent === 'not now {len(PRESSED) + 2}'")
     *asked, page, compare = asked
-    assert (page["command"], page["values"]["NAME"]) == ("page", "rrr3")
-    assert (compare["command"], compare["values"]["NAMES"]) == ("compare", ["own.yaml", "rrr3"])
+    assert (page["command"], page["values"]["NAME"]) == ("page", "own.yaml")
+    assert (compare["command"], compare["values"]["NAMES"]) == ("compare", ["rrr3", "own.yaml"])
     tab.select_option("#second", "")
     tab.unroute("**/runs")
     return asked
@@ -489,11 +494,12 @@ def test_seeded_presses_leave_it_alive(studio):
     with open_browser() as browser, open_tab(browser, 1100, 700) as tab:
         tab.goto(studio.address)
         wait_until(tab, "document.body.dataset.ready === 'yes'", 40.0)
-        wait_until(tab, "studio.readPose('own.yaml') !== null", 40.0)
-        tab.frames[1].evaluate("parakin.moveToPose([10, -5, 0.1])")
+        tab.select_option("#machine", "rrr3")
+        wait_until(tab, "studio.readPose('rrr3') !== null", 40.0)
+        tab.frames[1].evaluate("parakin.moveToPose([10, -5, 0.1]), parakin.switchSign(0)")
         for one, (command, values) in zip(press_all(tab), PRESSED, strict=True):
             machine = {"post": "--machine", "compare": "NAMES"}.get(command, "NAME")
-            name = ["own.yaml"] if command == "compare" else "own.yaml"
+            name = ["rrr3"] if command == "compare" else "rrr3"
             assert (one["command"], one["values"]) == (command, values | {machine: name})
         tab.evaluate(DROP, ["dropped.apt", 9])
         wait_until(tab, "document.getElementById('part').value === 'dropped.apt'")
@@ -504,7 +510,7 @@ def test_seeded_presses_leave_it_alive(studio):
         assert tab.evaluate("document.getElementById('part').value") == "dropped.apt"
         tab.context.grant_permissions(["clipboard-read", "clipboard-write"])
         tab.click("#runs .run button:text-is('Copy')")
-        assert tab.evaluate("navigator.clipboard.readText()") == "parakin page own.yaml --output=page_own.html"
+        assert tab.evaluate("navigator.clipboard.readText()") == "parakin page rrr3 --output=page_rrr3.html"
         tab.evaluate(PRESS)
         wait_until(
             tab,

@@ -90,13 +90,21 @@ const writeSize = (value, unit) => unit === "rad" ? `${+(value * 180 / Math.PI).
 // The pose at which a machine stands on its page, as the commands take it.
 function readPose(name) {
   const shown = pageOf(name);
-  if (!shown) return null;
-  const {axes} = shown.machine;
-  return axes.map((axis, i) => {
-    const letter = typeof axis === "string" ? axis : axis.name;
-    const value = "ABC".includes(letter) ? shown.state.pose[i] * 180 / Math.PI : shown.state.pose[i];
-    return `${letter}=${+value.toFixed(6)}`;
-  });
+  return shown ? shown.machine.axes.map((axis, i) => writeAxis(axis, shown.state.pose[i])) : null;
+}
+
+const writeAxis = ({name, unit}, value) => `${name}=${+(unit === "rad" ? value * 180 / Math.PI : value).toFixed(6)}`;
+
+// What a workspace on a machine's page is of: its setting by the page's own name, and the options that ask a command for it, where
+// orientation, working mode and sizes are not those of the file.
+function readSetting(name) {
+  const shown = pageOf(name), options = {...readSizes(name)};
+  if (!shown) return {setting: null, options};
+  const {machine: {axes, mode}, state: {pose, signs}} = shown;
+  const turned = axes.map((axis, i) => [axis, pose[i]]).filter(([axis, value]) => axis.unit === "rad" && Math.abs(value - axis.home) > 1e-9);
+  if (turned.length) options["--at"] = turned.map(([axis, value]) => writeAxis(axis, value)).join(",");
+  if (signs.some((sign, i) => sign !== mode[i])) options["--mode"] = signs.map(sign => sign > 0 ? "+" : "-").join("");
+  return {setting: shown.nameSetting(), options};
 }
 
 // A machine's file as it was written; where sizes were dragged, with these in it.

@@ -51,7 +51,7 @@ function findStrut(drive) {
 
 window.parakin = {
   machine, model, path, player, placing, movePath, writeWorkpiece, offerPosting, options, singularity, surface, section, orbit, shown, seek, stateAtTime, stateAtPose, followJoints, marginsAt, findRoot, measureSide, findFreeMotion,
-  moveToPose, moveToJoints, moveToSizes, listOwnSizes, switchSign, showNextAssembly, searchAssemblies, goHome, showSurface, showValues, showBox, setPlaying,
+  moveToPose, moveToJoints, moveToSizes, listOwnSizes, switchSign, showNextAssembly, searchAssemblies, goHome, nameSetting, showSurface, showValues, showBox, setPlaying,
   arrowInPicture: axis => findInPicture(arrows.localToWorld(new THREE.Vector3().setComponent(axis, 0.9))),
   tipInPicture: () => findInPicture(handle.position), strutInPicture: drive => findInPicture(findStrut(drive)),
   shownCorners: () => Array.from(shownMesh.geometry.attributes.position.array),

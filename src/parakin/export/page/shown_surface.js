@@ -9,10 +9,10 @@ shownMesh.renderOrder = 1;
 workGroup.add(shownMesh);
 
 // Draw triangles, nine numbers each, mm; none for nothing.
-function showSurface(corners) {
+function showSurface(corners, setting = nameSetting()) {
   replaceGeometry(shownMesh, {position: new Float32Array(corners)}).computeVertexNormals();
   if (corners.length) fitOrbit(shownMesh.geometry, "proved");
-  rememberShown();
+  rememberSetting(shownMesh, setting);
   requestPicture();
 }
 

@@ -8,25 +8,26 @@ valueMesh.frustumCulled = shownBox.frustumCulled = false;
 workGroup.add(valueMesh, shownBox);
 const valueNote = makeElement("p", {className: "note"});
 workspaceSection.append(valueNote);
-const shown = {values: 0, box: null}; // what was drawn last
+const shown = {values: 0, box: null, visible: []}; // what was drawn last, and which of values, box and surface are seen
 
-// What is shown is of the sizes, the mode and the orientation at which it was drawn; elsewhere it is hidden.
-let shownFor = "";
-
-function rememberShown() {
-  shownFor = nameSetting();
+// Each is of a setting: sizes, mode and orientation; where the machine stands in another one it is hidden.
+function rememberSetting(mesh, setting) {
+  mesh.userData.setting = setting;
   hideOthers();
 }
 
 function hideOthers() {
-  for (const mesh of [valueMesh, shownBox, shownMesh]) mesh.visible = nameSetting() === shownFor;
+  const setting = nameSetting();
+  const meshes = [valueMesh, shownBox, shownMesh];
+  for (const mesh of meshes) mesh.visible = mesh.userData.setting === setting;
+  shown.visible = meshes.map(mesh => mesh.visible);
 }
 
 listeners.push(hideOthers);
 
 // Draw a square of a grid's step about the tip of each pose, mm and rad, parallel to the first two axes, coloured by a
 // value from 0, violet, to 1, yellow; none for nothing.
-function showValues(poses, values, step, title) {
+function showValues(poses, values, step, title, setting = nameSetting()) {
   const place = new THREE.Vector3(), colour = new THREE.Color(), positions = new Float32Array(18 * poses.length), colours = new Float32Array(18 * poses.length);
   const [a, b] = places.map(axis => "XYZ".indexOf(machine.axes[axis].name));
   poses.forEach((pose, n) => {
@@ -44,12 +45,12 @@ function showValues(poses, values, step, title) {
   valueNote.textContent = poses.length ? `${title}, violet 0 to yellow 1: ${min(...values).toPrecision(3)} to ${max(...values).toPrecision(3)}.` : "";
   shown.values = poses.length;
   if (poses.length) fitOrbit(valueMesh.geometry, "values");
-  rememberShown();
+  rememberSetting(valueMesh, setting);
   requestPicture();
 }
 
 // Draw the edges of a box between two corners along the axes that move, mm.
-function showBox(low, high) {
+function showBox(low, high, setting = nameSetting()) {
   const ends = [low, high].map(values => {
     const pose = current.pose.slice();
     places.forEach((axis, k) => { pose[axis] = values[k]; });
@@ -60,6 +61,6 @@ function showBox(low, high) {
   replaceGeometry(shownBox, {position: new Float32Array(edges)});
   shown.box = [low, high];
   fitOrbit(shownBox.geometry, "box");
-  rememberShown();
+  rememberSetting(shownBox, setting);
   requestPicture();
 }

@@ -211,7 +211,8 @@ DRAG_DRIVES = """shares => {
       let count = 0;
       parakin.goHome();
       window.stateAtPose = (...given) => { count += 1; return inverse(...given); };
-      const goal = parakin.state.joints.map((q, i) => i === drive ? q + share * (unit === "rad" ? 1 : machine.size) : q);
+      const step = share * (unit === "rad" ? 1 : machine.size);
+      const goal = parakin.state.joints.map((q, i) => i === drive ? q + step : q);
       parakin.moveToJoints(goal);
       window.stateAtPose = inverse;
       const {pose, joints} = parakin.state;

@@ -27,7 +27,7 @@ def main() -> None:
     print(f"and one is off by {1e3 * cube.attained:.0f} um, at {cube.pose.round(1)}")
 
     allowed = pk.allocate_tolerances(accuracy, 0.05, costs={"feet": 1.0, "rods": 2.0, "encoders": 0.1})
-    print("50 um all over the workspace:", ", ".join(f"{name} {1e3 * value:.1f} um" for name, value in allowed.items()))
+    print("50 um all over the workspace:", ", ".join(f"{each.name} {1e3 * each.value:.1f} um" for each in allowed))
     for path in pk.write_files(folder, {"accuracy.png": pk.render_accuracy_map(accuracy)}):
         print(path)
 

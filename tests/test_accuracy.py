@@ -164,7 +164,7 @@ def test_allowed_tolerances_are_the_cheapest():
     """Against a lattice of all tolerances that keep the error, and against the closed form of one pose."""
     accuracy = pk.analyse_accuracy(load_shipped("orthoglide"), {"feet": "0.05 mm", "rods": "0.02 mm"})
     costs = {"feet": 2.0, "rods": 1.0}
-    allowed = pk.allocate_tolerances(accuracy, 0.05, costs)
+    allowed = {each.name: each.value for each in pk.allocate_tolerances(accuracy, 0.05, costs)}
     again = pk.analyse_accuracy(
         accuracy.machine, {name: f"{value!r} mm" for name, value in allowed.items()}, accuracy.poses
     )
@@ -185,6 +185,24 @@ def test_allowed_tolerances_are_the_cheapest():
     ]
     assert price(**allowed) <= min(prices) * (1.0 + 1e-9)
     assert price(**allowed) > 0.95 * min(prices)
+
+
+def test_allowed_tolerances_of_one_name_are_those_of_lengths_and_of_angles():
+    """Slides and turns of a Tricept have each their own, and what cannot move the tip costs nothing."""
+    tricept = load_shipped("tricept")
+    pairs = [("encoders", "4 um"), ("encoders", "0.01 deg"), ("feet", "0.05 mm")]
+    accuracy = pk.analyse_accuracy(tricept, pairs, samples=50)
+    allowed = pk.allocate_tolerances(accuracy, 0.05)
+    assert [(each.name, each.unit) for each in allowed] == [("encoders", "mm"), ("encoders", "rad"), ("feet", "mm")]
+    again = [(each.name, f"{each.value!r} {each.unit}") for each in allowed]
+    assert pk.analyse_accuracy(tricept, again, accuracy.poses).percentile(100) == pytest.approx(0.05, rel=1e-6)
+    flat = pk.analyse_accuracy(load_shipped("rpr3"), {"feet": "0.05 mm", "encoders": "0.01 mm"}, samples=50)
+    by_coordinate = pk.analyse_accuracy(
+        flat.machine, {"legs.*.foot.x": "0.05 mm", "legs.*.foot.y": "0.05 mm", "encoders": "0.01 mm"}, flat.poses
+    )
+    *_, alone = pk.allocate_tolerances(by_coordinate, 0.05, {"legs.*.foot.x": 1.0, "legs.*.foot.y": 1.0})
+    *_, grouped = pk.allocate_tolerances(flat, 0.05)
+    assert grouped.value == pytest.approx(alone.value, rel=0.05)  # not as if there were nine coordinates in the plane
 
 
 def test_the_command(tmp_path, capsys):

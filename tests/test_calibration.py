@@ -13,6 +13,7 @@ from scipy.spatial.transform import Rotation
 from shipped import load_shipped
 
 import parakin as pk
+from parakin.calibration import calibration
 from parakin.calibration.calibration import choose_family
 from parakin.calibration.measurement_plan import choose_rows
 from parakin.calibration.setups import InstrumentFrame, UnknownPlane
@@ -154,6 +155,17 @@ def test_a_radius_and_rods_of_one_length_neither(name, free):
     assert {"tower", "R"} & set(re.findall(r"\w+", str(refusal.value)))
     both = pk.make_measurements(machine, joints, poses[:, [0, 2]], axes="X Z", noise=pk.Noise(0.02))
     assert pk.calibrate(machine, both, free).fit < 1e-3
+
+
+def test_what_is_measured_already_is_not_advised(monkeypatch):
+    machine = load_shipped("linear_delta")
+    joints, poses = measure_bed(machine)
+    whole = pk.make_measurements(machine, joints, poses, noise=pk.Noise(0.02))
+    free = ["rods", "encoders", "feet"]
+    amplified = pk.calibrate(machine, whole, free).combinations[0].amplification
+    monkeypatch.setattr(calibration, "AMPLIFIED", 0.9 * amplified)  # measured twice, it would be below
+    with pytest.raises(pk.UnidentifiableError, match="measure at more joints, farther apart"):
+        pk.calibrate(machine, whole, free)
 
 
 def test_probing_a_bed_tells_the_endstops():

@@ -15,6 +15,8 @@ from ..machine import Machine
 from ..workspaces.sampled.allowed_poses import SAMPLES, choose_poses
 from .tolerances import UNIFORM, Tolerance, ToleranceFamily, make_tolerance_family, read_tolerances
 
+_STILL = 1e-12  # of the greatest slope of the tip by a number: what is rounding
+
 
 @dataclass(frozen=True, eq=False)
 class Accuracy:
@@ -105,15 +107,18 @@ def analyse_accuracy(
 
 
 @check_arguments
-def allocate_tolerances(accuracy: Accuracy, error: float, costs: Mapping[str, float] | None = None) -> dict[str, float]:
+def allocate_tolerances(
+    accuracy: Accuracy, error: float, costs: Mapping[str, float] | None = None
+) -> tuple[Tolerance, ...]:
     """Find the tolerances of the least cost that keep the tip's deviation within an error at every pose, mm.
 
     accuracy : of :func:`analyse_accuracy`, at whose poses the error is kept
     error : root mean square of the tip's error, mm
-    costs : for each tolerance's name, what a number costs at a tolerance of 1 mm or 1 rad: the cost goes with its
-        inverse; by default 1, of an angle at the greatest leg's length
+    costs : for each tolerance's name, what a number that moves the tip costs at a tolerance of 1 mm or 1 rad: the cost
+        goes with its inverse; by default 1, of an angle at the greatest leg's length
 
-    Returns tolerances by name, mm and rad. The cost is convex in their squares, in which the variance is linear.
+    Returns the tolerances with other values, mm and rad, in the order in which they were given. The cost is convex in
+    their squares, in which the variance is linear.
 
     Raises :class:`PoseError` for an error that is not above zero, a cost of no tolerance, and a tolerance that does not
     move the tip.
@@ -133,7 +138,9 @@ def allocate_tolerances(accuracy: Accuracy, error: float, costs: Mapping[str, fl
     if not (of_one.max(0) > 0.0).all():
         idle = names[int((of_one.max(0) == 0.0).argmax())]
         raise PoseError(f"tolerance {idle}: it does not move the tip, so any is allowed; leave it out")
-    counts = [len(columns) for columns in within.groups]
+    tip = sum(axis in "XYZ" for axis in accuracy.machine.axes)
+    reach = np.abs(accuracy.slopes[:, :tip]).max((0, 1))
+    counts = [np.count_nonzero(reach[columns] > _STILL * reach.max()) for columns in within.groups]
     weights = np.array([(costs or {}).get(name, 1.0) * count for name, count in zip(names, counts, strict=True)])
     # In logarithms of the tolerances: a sum of exponentials under bounds on sums of exponentials, both convex.
     begin = -0.5 * np.log(of_one.max(0) * len(names))
@@ -151,4 +158,7 @@ def allocate_tolerances(accuracy: Accuracy, error: float, costs: Mapping[str, fl
     )
     squares = np.exp(2.0 * result.x)
     squares /= max(float((of_one @ squares).max()), 1e-300)  # on the bound, whatever the rounding
-    return dict(zip(names, (np.sqrt(squares) * units).tolist(), strict=True))
+    values = np.sqrt(squares) * units
+    return tuple(
+        tolerance._replace(value=value) for tolerance, value in zip(within.tolerances, values.tolist(), strict=True)
+    )

@@ -281,7 +281,10 @@ class CalibrationProblem:
         others.append((f"measure {tip.replace(' ', ', ')} of the tool{where}", tip))
         if len(machine.axes) > len(tip.split()):
             others.append((f"measure the whole pose of the tool{where}", " ".join(machine.axes)))
+        known = set() if where else set(measured.axes)
         for text, axes in others:
+            if known.issuperset(axes.split()):
+                continue  # measured again it would tell no more than a better noise
             columns = [machine.axes.index(axis) for axis in axes.split()]
             values = self.measured.starts[:, columns]
             more = make_measurements(machine, measured.joints, values, axes, noise=measured.noise)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -18,6 +18,7 @@ from .region_options import parse_axis_ranges, parse_time
 
 if TYPE_CHECKING:
     from ..accuracy.accuracy import Accuracy
+    from ..accuracy.tolerances import Tolerance
     from ..accuracy.worst_case import WorstCase
     from ..arrays import Array
     from ..machine import Machine
@@ -133,7 +134,7 @@ def _format_pose(machine: Machine, pose: Array) -> str:
     return " ".join(f"{axis}={format_fixed(to_display(value, unit), 3, '')}" for axis, value, unit in values)
 
 
-def _format_accuracy(result: Accuracy, proved: WorstCase | None, allowed: Mapping[str, float] | None) -> str:
+def _format_accuracy(result: Accuracy, proved: WorstCase | None, allowed: Sequence[Tolerance] | None) -> str:
     machine = result.machine
     median, most, worst = (1e3 * result.percentile(percent) for percent in (50, 95, 100))
     where = _format_pose(machine, result.poses[result.worst])
@@ -147,12 +148,12 @@ def _format_accuracy(result: Accuracy, proved: WorstCase | None, allowed: Mappin
     if result.turns.any():
         turn = format_fixed(to_display(float(result.turns.max()), "rad"), 5)
         lines.append(f"the tool's turn, root mean square: at most {turn} deg")
-    rows = []
+    rows, wanted = [], {(one.name, one.unit): one.value for one in allowed or ()}
     for tolerance, mean, at_worst in result.budget:
         value, unit = to_display(tolerance.value, tolerance.unit), name_display_unit(tolerance.unit)
         row = [tolerance.name, f"{value:.6g} {unit}", f"{100.0 * mean:.1f} %", f"{100.0 * at_worst:.1f} %"]
         if allowed is not None:
-            row.append(f"{to_display(allowed[tolerance.name], tolerance.unit):.3g} {unit}")
+            row.append(f"{to_display(wanted[tolerance.name, tolerance.unit], tolerance.unit):.3g} {unit}")
         rows.append(row)
     header = ["tolerance", "either way", "of the variance", "at the worst pose"]
     header += ["allowed"] if allowed is not None else []

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from ...units import name_display_unit, to_display
@@ -10,17 +10,18 @@ from .performance import encode_pose
 
 if TYPE_CHECKING:
     from ...accuracy.accuracy import Accuracy
+    from ...accuracy.tolerances import Tolerance
     from ...accuracy.worst_case import WorstCase
 
 
 def encode_accuracy(
     accuracy: Accuracy,
     worst_case: WorstCase | None,
-    allowed: Mapping[str, float] | None,
+    allowed: Sequence[Tolerance] | None,
     files: Mapping[str, str],
 ) -> dict[str, Any]:
     """Encode the tool's error over the workspace, its proved bound and the allowed tolerances; mm and degrees."""
-    machine, units = accuracy.machine, {t.name: t.unit for t in accuracy.tolerances.tolerances}
+    machine = accuracy.machine
     return {
         "schema": "parakin.accuracy/1",
         "machine": machine.name,
@@ -30,13 +31,7 @@ def encode_accuracy(
         "first_order_bound": float(accuracy.greatest.max()),
         "worst_pose": encode_pose(machine, accuracy.poses[accuracy.worst]),
         "budget": [
-            {
-                "name": tolerance.name,
-                "tolerance": to_display(tolerance.value, tolerance.unit),
-                "unit": name_display_unit(tolerance.unit),
-                "share": mean,
-                "share_at_worst_pose": worst,
-            }
+            {**_encode_tolerance(tolerance), "share": mean, "share_at_worst_pose": worst}
             for tolerance, mean, worst in accuracy.budget
         ],
         "worst_case": None
@@ -48,8 +43,14 @@ def encode_accuracy(
             "boxes": worst_case.boxes,
             "unproved": None if worst_case.unproved is None else encode_pose(machine, worst_case.unproved),
         },
-        "allowed": None
-        if allowed is None
-        else {name: to_display(value, units[name]) for name, value in allowed.items()},
+        "allowed": None if allowed is None else [_encode_tolerance(tolerance) for tolerance in allowed],
         "files": dict(files),
+    }
+
+
+def _encode_tolerance(tolerance: Tolerance) -> dict[str, Any]:
+    return {
+        "name": tolerance.name,
+        "tolerance": to_display(tolerance.value, tolerance.unit),
+        "unit": name_display_unit(tolerance.unit),
     }

@@ -187,7 +187,7 @@ def test_a_ball_bar_whose_end_is_not_known():
     point = np.array([30.0, -20.0, -250.0])
     lengths = np.linalg.norm(simulated.poses - point, axis=1) + simulated.rng.normal(0.0, 0.002, 120)
     noise = pk.Noise(0.002)
-    rows = pk.make_measurements(simulated.machine, simulated.joints, distances=lengths[:, None], noise=noise)
+    rows = pk.make_measurements(simulated.machine, simulated.joints, distances=lengths, noise=noise)
     free = ["rods", "encoders"]
     family = pk.family(simulated.machine, free)
     true = family.nominal + np.array([0.1, -0.2, 0.05, 0.3, -0.1, 0.2])
@@ -292,7 +292,7 @@ def test_a_flat_artefact_whose_place_is_not_known():
     normal = np.array([0.05, -0.03, 1.0]) / np.linalg.norm([0.05, -0.03, 1.0])
     joints, heights = family.inverse(simulated.poses, true), simulated.poses @ normal + 55.0
     heights += simulated.rng.normal(0.0, 0.002, len(heights))
-    rows = pk.make_measurements(simulated.machine, joints, heights=heights[:, None], noise=pk.Noise(0.002))
+    rows = pk.make_measurements(simulated.machine, joints, heights=heights, noise=pk.Noise(0.002))
     result = pk.calibrate(simulated.machine, rows, ["rods"])
     deviations = np.array([p.deviation for p in result.parameters])
     assert np.abs(result.sizes - true).max() < 4.0 * deviations.max() < 0.05

@@ -132,20 +132,18 @@ def make_measurements(
         units = [unit for axis, unit in zip(machine.axes, machine.axis_units, strict=True) if axis in names]
         measured = read_rows(values, names, units, lambda: np.full(len(names), np.nan), "values")
     lengths, over = (
-        None if one is None else np.asarray(read_rows(one, ("d",), ("mm",), lambda: np.empty(1), what))
+        None if one is None else _read_lengths(what, one, len(rows))
         for what, one in (("distances", distances), ("heights", heights))
     )
     setup = MeasuringSetup() if setup is None else setup
     if values is None and lengths is None and over is None and not setup.pinned:
         raise PoseError("values: measured coordinates, distances or heights expected")
-    for what, array in (("values", measured), ("distances", lengths), ("heights", over)):
-        if array is not None and (array.ndim != 2 or len(array) != len(rows) or not np.isfinite(array).all()):
-            raise PoseError(f"{what}: {len(rows)} rows of finite numbers expected, one a row of joints")
+    if measured.ndim != 2 or len(measured) != len(rows) or not np.isfinite(measured).all():
+        raise _refuse_rows("values", len(rows))
     if not np.isfinite(rows).all():
         raise PoseError("joints: finite numbers expected")
     point = None if setup.centre is None else read_vector("centre", setup.centre, tuple(LETTERS))
     _check_setup(machine, setup, names, over)
-    lengths, over = (None if one is None else one[:, 0] for one in (lengths, over))
     noise = Noise() if noise is None else noise
     check_noise(noise)
     return Measurements(rows, names, measured, lengths, over, setup.frame, point, setup.pinned, noise)
@@ -174,6 +172,18 @@ def check_measured_axes(machine: Machine, names: tuple[str, ...]) -> None:
     turning = [name for name in names if name not in LETTERS]
     if turning and len(names) != len(machine.axes):
         raise PoseError(f"axes: {' '.join(machine.axes)} or some of X Y Z expected, not {' '.join(names)}")
+
+
+def _read_lengths(what: str, values: RowsLike, count: int) -> Array:
+    """Read one length for each row of joints, (N,) or (N, 1); returns (N,)."""
+    lengths = read_rows({"d": values}, ("d",), ("mm",), lambda: np.empty(1), what)
+    if lengths.shape not in ((count, 1), (count, 1, 1)) or not np.isfinite(lengths).all():
+        raise _refuse_rows(what, count)
+    return lengths.reshape(count)
+
+
+def _refuse_rows(what: str, count: int) -> PoseError:
+    return PoseError(f"{what}: {count} rows of finite numbers expected, one a row of joints")
 
 
 def check_noise(noise: Noise) -> None:

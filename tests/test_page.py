@@ -533,6 +533,19 @@ def test_an_offence_is_clicked(tmp_path, browser):
         assert offence.inner_text().startswith("long.ngc:4: leg tower_b can't close")  # no path of this computer
         offence.click()
         assert tab.locator("#verdict").get_attribute("class") == "bad"
+        assert tab.inner_text("#verdict") == "Out of reach: tower_b.reach; the machine stays behind"
+        gauge = tab.locator(".gauge:visible", has_text="tower_b.reach")
+        assert (gauge.get_attribute("class"), gauge.locator("span").inner_text()) == ("gauge bad", "out of reach")
+        tab.set_viewport_size({"width": 820, "height": 590})  # of a tablet's page half
+        side, stage, footer = (tab.locator(one).bounding_box() for one in ("#side", "#stage", "#player"))
+        assert stage["height"] > 150 and side["height"] > 120
+        assert stage["y"] + stage["height"] <= side["y"] + 1 and side["y"] + side["height"] <= footer["y"] + 1
+        assert footer["y"] + footer["height"] <= 590.5
+        tab.mouse.move(410, side["y"] + 60)
+        tab.mouse.wheel(0, 3000)
+        wait_until(tab, "document.getElementById('side').scrollTop > 0")
+        wait_until(tab, f"document.getElementById('panel').getBoundingClientRect().bottom <= {footer['y'] + 1}")
+        tab.set_viewport_size({"width": 1280, "height": 800})
         for _ in range(2):
             assert not list_pale_texts(tab)
             tab.click("#theme")  # light again, in the end

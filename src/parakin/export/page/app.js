@@ -1,7 +1,7 @@
 // All together: each change of the state is one picture.
 
 function update() {
-  const margins = marginsAt(current);
+  const margins = unreached ? marginsOfPose(unreached.pose, unreached.signs) : marginsAt(current);
   placeMachine(current);
   updateFreeMotion(current);
   updatePanel(margins);

@@ -154,10 +154,11 @@ const marginsAt = state => model.margins(state.pose, state.joints, state.signs);
 // The first limit that is broken, as its number; -1 where all hold.
 const findBroken = margins => margins.findIndex(margin => !(margin >= 0));
 
+// The margins of a pose that may be out of reach: none of what can't be told there.
+const marginsOfPose = (pose, signs) => model.margins(pose, model.inverse(pose, signs), signs);
+
 // The limits that a pose out of reach breaks.
-function findUnreached(pose, signs) {
-  return findBroken(model.margins(pose, model.inverse(pose, signs), signs));
-}
+const findUnreached = (pose, signs) => findBroken(marginsOfPose(pose, signs));
 
 // How near to its bound a limit is: 0 at it, 1 from a quarter of home's margin on.
 function rateMargin(margin, i) {

@@ -6,6 +6,7 @@ let homeSide = measureSide(stateAtPose(everyHome(), machine.mode, null));
 let current = stateAtPose(begin, signs ?? machine.mode, null);
 const options = {stops: true};
 let stoppedBy = null; // why the last move ended early, as text
+let unreached = null; // the pose and signs that were to be shown, where they are out of reach: limits are told of these
 const listeners = [];
 let stopPlaying = () => {}; // the player's; what a hand moves is not played on
 
@@ -13,9 +14,10 @@ function announce() {
   for (const listener of listeners) listener();
 }
 
-function setState(state, reason = null) {
+function setState(state, reason = null, missed = null) {
   current = state;
   stoppedBy = reason;
+  unreached = missed;
   announce();
 }
 
@@ -31,6 +33,11 @@ function findObstacle(state, side) {
 function describeUnreached(pose, signs) {
   const broken = findUnreached(pose, signs);
   return broken < 0 ? "out of reach" : nameLimit(broken);
+}
+
+// Stay where a pose is out of reach.
+function missPose(pose, signs) {
+  setState(current, describeUnreached(pose, signs), {pose, signs});
 }
 
 // Go on from share 0 towards 1 as far as there is no obstacle; tryShare returns one, or null where it went there.
@@ -55,7 +62,7 @@ function moveToPose(pose) {
   const from = current, side = measureSide(from);
   if (!isGuarded(from, side)) {
     const state = stateAtPose(pose, from.signs, from);
-    return state ? setState(state) : setState(from, describeUnreached(pose, from.signs));
+    return state ? setState(state) : missPose(pose, from.signs);
   }
   let state = from;
   const {reason} = goOn(share => {

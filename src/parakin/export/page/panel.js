@@ -100,7 +100,7 @@ function showLimit(gauge, i, margin) {
   const {name, subject, unit, side, bound} = machine.limits[i], own = side === "max" ? bound - margin : bound + margin;
   const sign = side === "max" ? "≤" : "≥", end = Number((bound * factorOf(unit)).toFixed(2));
   const value = side === "reach" ? margin >= 0 ? "reaches" : "out of reach"
-    : `${(own * factorOf(unit)).toFixed(1)} ${sign} ${end}${unit === "rad" ? "°" : ""}`;
+    : `${Number.isFinite(own) ? (own * factorOf(unit)).toFixed(1) : "–"} ${sign} ${end}${unit === "rad" ? "°" : ""}`;
   const title = side === "reach" ? `${subject} must close` : `${subject}: ${formatValue(own, unit)}, at ${side === "max" ? "most" : "least"} ${formatValue(bound, unit)}`;
   gauge(name, margin >= 0 ? max(1e-3, rateMargin(margin, i)) : 0, value, title);
 }
@@ -146,6 +146,6 @@ function showVerdict(margins, rates) {
   const verdict = document.getElementById("verdict"), broken = margins.flatMap((margin, i) => margin >= 0 ? [] : [nameLimit(i)]);
   const near = rates.some(rate => rate < 0.5);
   verdict.className = broken.length || stoppedBy ? "bad" : near ? "near" : "";
-  verdict.textContent = broken.length ? `Off limits: ${broken.slice(0, 4).join(", ")}${broken.length > 4 ? " and others" : ""}`
+  verdict.textContent = unreached ? `Out of reach: ${stoppedBy}; the machine stays behind` : broken.length ? `Off limits: ${broken.slice(0, 4).join(", ")}${broken.length > 4 ? " and others" : ""}`
     : stoppedBy ? `Stopped: ${stoppedBy}` : near ? "Allowed, near a limit" : "Allowed";
 }

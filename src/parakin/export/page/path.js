@@ -65,5 +65,5 @@ function seek(time) {
   player.time = max(0, min(path.end, time));
   const state = stateAtTime(player.time), whole = isFinitePose(state.joints);
   if (whole) setState(state);
-  else setState(current, `out of reach: ${describeUnreached(state.pose, path.signs)}`);
+  else missPose(state.pose, path.signs);
 }

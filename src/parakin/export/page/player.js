@@ -94,7 +94,7 @@ function findCurveBounds() {
 // Each joint over its drive's range, whose ends are the dashed lines; off limits it is beyond them.
 let curveBounds = null;
 function drawCurves() {
-  const width = curves.clientWidth, height = 96, ratio = window.devicePixelRatio || 1, styles = getComputedStyle(document.documentElement);
+  const {clientWidth: width, clientHeight: height} = curves, ratio = window.devicePixelRatio || 1, styles = getComputedStyle(document.documentElement);
   curves.width = width * ratio;
   curves.height = height * ratio;
   const pen = curves.getContext("2d"), [low, high] = curveBounds ??= findCurveBounds();

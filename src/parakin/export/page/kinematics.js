@@ -79,11 +79,10 @@ function settleJoints(state, joints, counts) {
   const weighs = machine.joints.map((joint, i) => counts[i] * (isTurning[i] ? machine.size : 1));
   let here = state, before = Infinity;
   for (let step = 0; step < MOST_STEPS; step++) {
-    const columns = axisNumbers.map(k => [-1, 1].map(way => stateAtPose(
-      here.pose.map((value, i) => i === k ? value + way * DIFFERENCE * arms[k] : value), here.signs, here)));
-    if (columns.flat().includes(null)) return null;
-    const slopes = weighs.flatMap((weight, i) =>
-      columns.map(([below, above]) => weight * (above.joints[i] - below.joints[i]) / (2 * DIFFERENCE)));
+    const beside = axisNumbers.map(k => stateAtPose(
+      here.pose.map((value, i) => i === k ? value + DIFFERENCE * arms[k] : value), here.signs, here));
+    if (beside.includes(null)) return null;
+    const slopes = weighs.flatMap((weight, i) => beside.map(({joints}) => weight * (joints[i] - here.joints[i]) / DIFFERENCE));
     const off = weighs.map((weight, i) => counts[i] === FOLLOWS ? 0 : weight * (here.joints[i] - joints[i]));
     const {x} = solveLeastSquares(slopes, off, n), most = max(...x.map(abs));
     if (!Number.isFinite(most)) return null;

@@ -79,10 +79,10 @@ function moveToPose(pose) {
 function moveToJoints(joints) {
   stopPlaying();
   const from = current, side = measureSide(from);
-  const guarded = isGuarded(from, side);
+  const guarded = isGuarded(from, side), moved = joints.map((q, i) => q !== from.joints[i]);
   let reason = null, state = from;
   for (let k = 0; k < BISECTIONS; k++) {
-    const goal = k === 0 ? joints : joints.map((q, i) => 0.5 * (q + state.joints[i]));
+    const goal = k === 0 ? joints : state.joints.map((q, i) => moved[i] ? 0.5 * (q + joints[i]) : q);
     let met = false; // an obstacle, on this way
     const way = followJoints(state, goal, next => {
       const obstacle = guarded ? findObstacle(next, side) : null;
@@ -95,7 +95,7 @@ function moveToJoints(joints) {
     state = way.state;
     if (!way.complete && !met) reason ??= "parallel singularity";
     if (!met && (k === 0 || !way.complete) || !guarded) break; // a way ends next to a singularity
-    if (joints.every((q, i) => abs(q - state.joints[i]) < 1e-9)) break;
+    if (joints.every((q, i) => !moved[i] || abs(q - state.joints[i]) < 1e-9)) break;
   }
   setState(state, reason);
 }

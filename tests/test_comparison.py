@@ -1,6 +1,9 @@
 """Machines side by side: the figures are those that the single commands tell."""
 
 import json
+import subprocess
+import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -86,3 +89,11 @@ def test_what_is_mistaken_is_said_in_one_line(words, message, capsys):
     assert said.out == ""
     assert said.err.count("\n") == 1
     assert message in said.err
+
+
+def test_the_example_runs(tmp_path):
+    script = Path(__file__).parents[1] / "examples" / "comparison.py"
+    words = [sys.executable, script, "-o", tmp_path, "--samples", "40"]
+    done = subprocess.run(words, capture_output=True, text=True, check=True)
+    assert "hexapod: " in done.stdout
+    assert "hexapod" in (tmp_path / "comparison.html").read_text("utf-8")

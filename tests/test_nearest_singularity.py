@@ -1,7 +1,10 @@
 """The largest box and sphere without a parallel singularity, against the Orthoglide's closed form and drawn poses."""
 
 import json
+import subprocess
+import sys
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -120,3 +123,10 @@ def test_what_is_mistaken_is_one_line(words, message, capsys):
     said = capsys.readouterr()
     assert (said.out, said.err.count("\n")) == ("", 1)
     assert message in said.err
+
+
+def test_the_example_runs(tmp_path):
+    script = Path(__file__).parents[1] / "examples" / "singularities.py"
+    done = subprocess.run([sys.executable, script, "-o", tmp_path], capture_output=True, text=True, check=True)
+    assert "ended by what is singular at C 60.00 deg" in done.stdout
+    assert (tmp_path / "singularities.png").exists()

@@ -536,6 +536,10 @@ def test_an_offence_is_clicked(tmp_path, browser):
         assert tab.inner_text("#verdict") == "Out of reach: tower_b.reach; the machine stays behind"
         gauge = tab.locator(".gauge:visible", has_text="tower_b.reach")
         assert (gauge.get_attribute("class"), gauge.locator("span").inner_text()) == ("gauge bad", "out of reach")
+        said = tab.evaluate(
+            "Array.from({length: 500}, (_, k) => (parakin.seek(k / 500 * parakin.path.end), parakin.stoppedBy))"
+        )
+        assert set(said) == {None, "tower_b.reach", "tower_c.reach"}  # each time by its name
         tab.set_viewport_size({"width": 820, "height": 590})  # of a tablet's page half
         side, stage, footer = (tab.locator(one).bounding_box() for one in ("#side", "#stage", "#player"))
         assert stage["height"] > 150 and side["height"] > 120

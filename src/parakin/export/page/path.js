@@ -63,7 +63,8 @@ function stateAtTime(time) {
 
 function seek(time) {
   player.time = max(0, min(path.end, time));
-  const state = stateAtTime(player.time), whole = isFinitePose(state.joints);
-  if (whole) setState(state);
+  const state = stateAtTime(player.time); // without joints where the next sample is out of reach
+  const reached = isFinitePose(state.joints) ? state : stateAtPose(state.pose, path.signs, current);
+  if (reached) setState(reached);
   else missPose(state.pose, path.signs);
 }

@@ -12,3 +12,5 @@ settings.register_profile(
     suppress_health_check=[HealthCheck.too_slow, HealthCheck.function_scoped_fixture],
 )
 settings.load_profile("parakin")
+
+os.environ.pop("COLUMNS", None)  # processes of pytest-xdist have 80, and what is written to files is not cut to lines

@@ -12,7 +12,7 @@ from ..errors import InputError, quote
 from ..export.figure_file import PICTURES
 from ..export.number_format import format_fixed
 from ..units import LENGTH, QuantityError, name_display_unit, parse_quantity, to_display
-from .console import announce_compiling, format_table, print_json, print_text
+from .console import announce_compiling, format_pose, format_table, print_json, print_text
 from .options import Json, Name, OutputPath, Sizes, load_machine, require_ending, tell_options
 from .region_options import parse_axis_ranges, parse_time
 
@@ -20,8 +20,6 @@ if TYPE_CHECKING:
     from ..accuracy.accuracy import Accuracy
     from ..accuracy.tolerances import Tolerance
     from ..accuracy.worst_case import WorstCase
-    from ..arrays import Array
-    from ..machine import Machine
 
 _LONGEST = 60.0  # s of a proof, if nothing else is said
 
@@ -129,15 +127,10 @@ def _parse_costs(texts: Sequence[str] | None) -> dict[str, float]:
     return costs
 
 
-def _format_pose(machine: Machine, pose: Array) -> str:
-    values = zip(machine.axes, pose.tolist(), machine.axis_units, strict=True)
-    return " ".join(f"{axis}={format_fixed(to_display(value, unit), 3, '')}" for axis, value, unit in values)
-
-
 def _format_accuracy(result: Accuracy, proved: WorstCase | None, allowed: Sequence[Tolerance] | None) -> str:
     machine = result.machine
     median, most, worst = (1e3 * result.percentile(percent) for percent in (50, 95, 100))
-    where = _format_pose(machine, result.poses[result.worst])
+    where = format_pose(machine, result.poses[result.worst])
     lines = [
         f"{machine.name}: the tip's error, root mean square, at {len(result.poses)} poses of the workspace\n",
         f"half of them   {format_fixed(median, 1)} um",
@@ -161,7 +154,7 @@ def _format_accuracy(result: Accuracy, proved: WorstCase | None, allowed: Sequen
     if proved is not None:
         bound = f"no machine within them is off by more than  {format_fixed(1e3 * proved.bound, 1)} um"
         if proved.unproved is not None:
-            about = _format_pose(machine, proved.unproved)
+            about = format_pose(machine, proved.unproved)
             bound = f"no bound of their error was found at these tolerances about {about};\n"
             bound += "smaller tolerances, a smaller box or more time may give one"
         lines += ["", bound]

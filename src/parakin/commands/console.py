@@ -13,10 +13,15 @@ from typing import TYPE_CHECKING, Any
 
 from ..errors import make_printable
 from ..export.json.text import format_json
+from ..export.number_format import format_fixed
 from ..kernels.compile_notice import call_at_first_compilation
+from ..units import to_display
 
 if TYPE_CHECKING:
     from rich.progress import Progress as Bar
+
+    from ..arrays import Array
+    from ..machine import Machine
 
 _QUIET = 1.0  # s of work before a bar appears
 
@@ -55,6 +60,12 @@ def _turn_row(row: Sequence[str], header: Sequence[str]) -> list[str]:
         if cell:
             lines[-1].append(cell)
     return ["  ".join(line) for line in lines if len(line) > 1 or line is lines[0]]
+
+
+def format_pose(machine: Machine, pose: Array) -> str:
+    """Format a pose, ``X=10.000 B=30.000``: mm and degrees."""
+    values = zip(machine.axes, pose.tolist(), machine.axis_units, strict=True)
+    return " ".join(f"{axis}={format_fixed(to_display(value, unit), 3, '')}" for axis, value, unit in values)
 
 
 def print_remark(text: str) -> None:

@@ -11,9 +11,8 @@ from cyclopts import Parameter
 from ..errors import InputError, quote
 from ..export.figure_file import PICTURES
 from ..export.number_format import format_fixed
-from ..units import to_display
 from .accuracy import split_pairs
-from .console import announce_compiling, format_table, print_json, print_remark, print_text
+from .console import announce_compiling, format_pose, format_table, print_json, print_remark, print_text
 from .force_option import parse_force
 from .options import OFF_LIMITS, Json, Name, OutputPath, Sizes, load_machine, require_ending
 
@@ -173,7 +172,7 @@ def _format_stiffness(result: Stiffness, force: Array | None) -> str:
         format_table(rows, ["", "at the worst", "5 % are below", "half are below"], " rrr"),
         "",
         "frame, platform, arms of cranks, and what guides without a drive count as rigid: a real machine is softer",
-        f"least at {_format_pose(machine, result.poses[int(result.least.argmin())])}",
+        f"least at {format_pose(machine, result.poses[int(result.least.argmin())])}",
         f"of the compliance the drives make {100.0 * float(np.mean(result.drive_share)):.0f} %",
     ]
     if result.springs.struts is None:
@@ -183,7 +182,7 @@ def _format_stiffness(result: Stiffness, force: Array | None) -> str:
         worst = int(sizes.argmax())
         median, most = (format_fixed(1e3 * float(value), 2) for value in (np.median(sizes), sizes[worst]))
         lines += ["", f"the force moves the tip by {median} um at half of them,"]
-        lines.append(f"and by {most} um at {_format_pose(machine, result.poses[worst])}")
+        lines.append(f"and by {most} um at {format_pose(machine, result.poses[worst])}")
     return "\n".join(lines)
 
 
@@ -195,7 +194,7 @@ def _format_sag(result: Stiffness) -> str:
     median, most = (format_fixed(1e3 * float(value), 2) for value in (np.median(sizes), sizes[worst]))
     return (
         f"\nits own weight moves the tip by {median} um at half of them,\n"
-        f"and by {most} um at {_format_pose(result.machine, result.poses[worst])}"
+        f"and by {most} um at {format_pose(result.machine, result.poses[worst])}"
     )
 
 
@@ -203,8 +202,3 @@ def _format_percentiles(values: Array) -> list[str]:
     import numpy as np
 
     return [format_fixed(1e-3 * float(np.percentile(values, percent)), 2) for percent in (0, 5, 50)]
-
-
-def _format_pose(machine: Machine, pose: Array) -> str:
-    cells = zip(machine.axes, pose.tolist(), machine.axis_units, strict=True)
-    return " ".join(f"{axis}={format_fixed(to_display(value, unit), 3, '')}" for axis, value, unit in cells)

@@ -135,6 +135,14 @@ class SetBox(PoseBox):
         return self.pose_set.place(dict(zip(self.ranges, self.inputs, strict=True)))
 
 
+def check_ends(where: str, low: float, high: float, rises: bool) -> None:
+    """Refuse the ends of a range that are not finite, do not rise, or lie farther out than any machine's."""
+    if not (isfinite(low) and isfinite(high) and rises):
+        raise PoseError(f"{where}: a range that rises expected, not {low:g} to {high:g}")
+    if max(abs(low), abs(high)) > LONGEST:
+        raise PoseError(f"{where}: {low:g} to {high:g} is out of range, at most 1 km expected")
+
+
 def make_box_set(machine: Machine, axes: Mapping[str, AxisRange | float], what: str) -> PoseSet:
     """Make a box of poses; axes that are not stated are as at home.
 
@@ -150,10 +158,7 @@ def make_box_set(machine: Machine, axes: Mapping[str, AxisRange | float], what: 
             raise PoseError(f"{what}: {axis} is missing")
         own = axes.get(axis, home[axis])
         low, high = (own, own) if isinstance(own, (int, float)) else own
-        if not (isfinite(low) and isfinite(high) and low <= high):
-            raise PoseError(f"{what}: {axis}: a range that rises expected, not {low:g} to {high:g}")
-        if max(abs(low), abs(high)) > LONGEST:
-            raise PoseError(f"{what}: {axis}: {low:g} to {high:g} is out of range, at most 1 km expected")
+        check_ends(f"{what}: {axis}", low, high, low <= high)
         ends[axis] = (low, high)
     return PoseSet(machine.axes, ends)
 

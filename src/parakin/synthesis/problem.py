@@ -16,12 +16,12 @@ from ..families.family import Family
 from ..machine import Machine
 from ..model.geometric_parameters import suggest_parameter
 from ..toolpath.path import ToolPath
-from ..units import LONGEST, name_display_unit, to_display
+from ..units import name_display_unit, to_display
 from .design_tapes import DesignTapes
 from .manufactured import Reserve, SizeBox
 from .measures import Measures
 from .part_timing import PartTimer
-from .pose_sets import PoseSet, make_box_set, make_cylinder_set
+from .pose_sets import PoseSet, check_ends, make_box_set, make_cylinder_set
 from .wants import WANTS
 from .workspace_gauge import WorkspaceGauge
 
@@ -94,10 +94,7 @@ class DesignProblem:
                 raise PoseError(f"free: unknown {quote(name)}{suggest_parameter(name, self.machine.parameters)}")
         for what, ranges in (("free", self.free), ("shift", self.shift)):
             for name, (low, high) in ranges.items():
-                if not (isfinite(low) and isfinite(high) and low < high):
-                    raise PoseError(f"{what}: {name}: a range that rises expected, not {low:g} to {high:g}")
-                if max(abs(low), abs(high)) > LONGEST:
-                    raise PoseError(f"{what}: {name}: {low:g} to {high:g} is out of range, at most 1 km expected")
+                check_ends(f"{what}: {name}", low, high, low < high)
         self._check_poses()
         self._check_wants()
         nominal = {parameter.name: parameter.value for parameter in self.family.parameters}

@@ -48,7 +48,7 @@ def encode_page_machine(machine: Machine) -> dict[str, Any]:
             }
             for drive, leg in zip(machine.drives, _list_legs(machine), strict=True)
         ],
-        "mode": [1 if sign == "+" else -1 for sign in machine.mode],
+        "mode": encode_mode(machine.mode),
         "signs": _name_signs(machine),
         "fixed_signs": machine.fixed_signs,
         "limits": [
@@ -81,6 +81,11 @@ def encode_page_machine(machine: Machine) -> dict[str, Any]:
         "tolerance": machine.closure_tolerance,
         **_encode_scene(machine, scene),
     }
+
+
+def encode_mode(mode: str) -> list[int]:
+    """Encode a working mode as 1 and -1."""
+    return [1 if sign == "+" else -1 for sign in mode]
 
 
 def _replace_infinite(value: float) -> float | None:

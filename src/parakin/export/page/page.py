@@ -14,7 +14,7 @@ import numpy as np
 from ...arguments import RowsLike, check_arguments
 from ...errors import PoseError
 from ...machine import Machine
-from .machine_data import encode_page_machine
+from .machine_data import encode_mode, encode_page_machine
 from .model_script import write_model
 from .path_data import encode_page_path
 from .surface_data import encode_page_surface
@@ -99,8 +99,7 @@ def render_workspace_page(field: SampledField) -> str:
         pose[[machine.axes.index(axis) for axis in region.free_axes]] = place
         if machine.check(pose, mode=region.mode) == 0:
             break
-    signs = [1 if sign == "+" else -1 for sign in region.mode]
-    given = {"begin": pose.tolist(), "signs": signs, "proved": encode_page_surface(field)}
+    given = {"begin": pose.tolist(), "signs": encode_mode(region.mode), "proved": encode_page_surface(field)}
     return _render_page(machine, f"Workspace of {_name_page(machine)}", given)
 
 

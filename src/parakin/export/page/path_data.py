@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from base64 import b64encode
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -14,6 +13,8 @@ from ...toolpath.posting.frames import compose_frames, find_frame_angles, invert
 from ...toolpath.posting.offence_texts import describe_place
 from ...toolpath.posting.range_use import compute_relative_margin, measure_range_use
 from ..colours import choose_binding_colours
+from .machine_data import encode_mode
+from .packed_arrays import pack_array
 
 if TYPE_CHECKING:
     from ...toolpath.posting.posted import Offence, Posted
@@ -44,14 +45,13 @@ def encode_page_path(posted: Posted, trajectory: Trajectory | None, numbers: int
     offences = posted.offences[:_MOST_OFFENCES]
     colours = {} if trajectory is None else choose_binding_colours(trajectory)
     names = () if trajectory is None else trajectory.names
-    signs = [1 if sign == "+" else -1 for sign in posted.mode]
     return {
         "source": Path(posted.path.source).name or posted.path.source,
         "timed": trajectory is not None,
         "end": float(np.float32(columns["times"][-1])),  # as the column has it, whose last sample is reached then
-        "signs": signs,
+        "signs": encode_mode(posted.mode),
         "samples": len(columns["times"]),
-        "columns": {name: _encode_column(values) for name, values in columns.items()},
+        "columns": {name: pack_array(values, "<f4") for name, values in columns.items()},
         "bindings": [{"name": name, "colour": colours.get(name)} for name in names],
         "offences": [
             _encode_offence(posted, offence, int(np.abs(columns["times"] - at).argmin()))
@@ -67,10 +67,6 @@ def _find_workpiece(posted: Posted) -> list[float]:
     own = posted.path.frame
     placed = posted.frame if own is None else compose_frames(posted.frame, invert_frame(own))
     return [*placed[:, 3].tolist(), *find_frame_angles(placed)]
-
-
-def _encode_column(values: Array) -> str:
-    return b64encode(np.ascontiguousarray(values, "<f4").tobytes()).decode("ascii")
 
 
 def _locate_offences(trajectory: Trajectory | None, offences: Sequence[Offence]) -> list[float]:

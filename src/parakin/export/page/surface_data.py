@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from base64 import b64encode
 from typing import Any
 
 import numpy as np
@@ -10,6 +9,7 @@ import numpy as np
 from ...arrays import Array, Indices
 from ...workspaces.sampled.distance_field import SampledField
 from ..workspace.meshes import make_mesh
+from .packed_arrays import pack_array
 
 _FINEST = 2**16 - 1  # steps along the longest edge
 
@@ -28,8 +28,8 @@ def encode_page_surface(field: SampledField) -> dict[str, Any]:
         "axes": axes,
         "low": low.tolist(),
         "step": step,
-        "corners": _pack(np.rint((corners - low) / step), "<u2"),
-        "faces": _pack(faces, "<u4" if wide else "<u2"),
+        "corners": pack_array(np.rint((corners - low) / step), "<u2"),
+        "faces": pack_array(faces, "<u4" if wide else "<u2"),
         "wide": wide,
     }
 
@@ -54,7 +54,3 @@ def _make_area(field: SampledField) -> tuple[Array, Indices]:
     places = field.low + at * field.step
     places[on_boundary] = field.refine_crossings(at[on_boundary])
     return places, faces.astype(np.int64)
-
-
-def _pack(values: Array | Indices, kind: str) -> str:
-    return b64encode(np.ascontiguousarray(values.astype(kind)).tobytes()).decode("ascii")
